@@ -1,0 +1,1 @@
+"""Decide, check, show and hand over a scanning lidar campaign."""

@@ -1,0 +1,62 @@
+"""Beams that meet something solid, or nearly do."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from geometry.arrays import BoolArray
+from planner.finding import Finding, Severity
+from planner.obstruction import Obstruction
+from planner.plan import Plan
+
+
+def find(plan: Plan) -> Iterator[Finding]:
+    """Findings about rays lost to rotors, towers, masts and obstacles, and about near misses."""
+    for met in plan.obstructions:
+        yield _lost(met) if met.lost_rays else _near(met)
+
+
+def _lost(met: Obstruction) -> Finding:
+    """Rays that touch; all of them lost to something that stands still is an error."""
+    turned = " (counted as turned to any wind)" if met.part == "rotor" else ""
+    text = (
+        f"{_which(met)} lost to {_named(met)}{turned}, {met.range_m:.0f} m from the head, in every scan: "
+        + ("move the lidar or the target" if met.rays == 1 else "move the lidar, raise the scan or leave them out")
+    )
+    whole = met.lost_rays == met.rays and met.part != "rotor"  # a rotor is in the way in some winds only
+    severity: Severity = "error" if whole else "warning"
+    return Finding(severity, "beam-blocked", met.scan, met.clearance_m, "m", 0.0, text)
+
+
+def _near(met: Obstruction) -> Finding:
+    """Rays that pass so close that their own uncertainty may make them touch."""
+    text = (
+        f"a beam passes {_named(met)} at {met.clearance_m:.1f} m, {met.range_m:.0f} m from the head, nearer than it is sure "
+        f"of its own place ({met.margin_m:.1f} m, two standard deviations): look for echoes of it before trusting the gate"
+    )
+    return Finding("info", "beam-near", met.scan, met.clearance_m, "m", met.margin_m, text)
+
+
+def _named(met: Obstruction) -> str:
+    """The thing in words: the rotor of stand 5, mast M1."""
+    if met.part in ("rotor", "tower"):
+        return f"the {met.part} of {met.thing}"
+    return met.thing if met.thing.startswith(met.part) else f"{met.part} {met.thing}"
+
+
+def _which(met: Obstruction) -> str:
+    """The lost rays in words: how many, their numbers from 1, their azimuths."""
+    if met.rays == 1:
+        return "the beam is"
+    first, last = met.lost_azimuth_deg[0], met.lost_azimuth_deg[-1]
+    alone = met.lost_rays == 1
+    azimuth = f"{first:.1f}°" if alone else f"{first:.1f} to {last:.1f}°"
+    numbers = f"{'number' if alone else 'numbers'} {_runs(met.lost)}, azimuth {azimuth}"
+    return f"{met.lost_rays} of {met.rays} rays ({numbers}) {'is' if alone else 'are'}"
+
+
+def _runs(lost: BoolArray) -> str:
+    """Numbers of the lost rays, counted from 1, as runs: 3-5, 8."""
+    numbers = np.flatnonzero(lost) + 1
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)

@@ -1,0 +1,44 @@
+"""`lidarplan check SITE`: findings."""
+
+import typer
+
+from planner.commands.options import (
+    FidelityOption,
+    JsonOption,
+    QuietOption,
+    SiteArgument,
+    remark,
+    say,
+    say_json,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    app.command("check")(check)
+
+
+def check(
+    site: SiteArgument, fidelity: FidelityOption = None, json: JsonOption = False, quiet: QuietOption = False
+) -> None:
+    """Findings about the plan; exit code 1 if one of them is an error."""
+    from planner.checks import findings
+    from planner.commands.load import load_plan
+    from planner.commands.table import print_table
+    from planner.finding import SEVERITIES
+
+    found = findings(load_plan(site, fidelity))
+    counts = [sum(finding.severity == severity for finding in found) for severity in SEVERITIES]
+    if json:
+        say_json([finding._asdict() for finding in found])
+    elif found:
+        rows = [(finding.severity, finding.code, finding.subject, finding.text) for finding in found]
+        print_table("", ("severity", "code", "subject", "finding"), rows, fold="finding")
+    else:
+        say("Nothing found.")
+    remark(
+        "{} errors, {} warnings, {} remarks; docs/findings.md says what each code means.".format(*counts),
+        quiet=quiet,
+    )
+    if counts[0]:
+        raise typer.Exit(1)

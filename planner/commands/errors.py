@@ -1,0 +1,134 @@
+"""`lidarplan errors SITE`: the predicted error per sector size."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from planner.commands.options import (
+    FidelityOption,
+    JsonOption,
+    QuietOption,
+    SiteArgument,
+    remark,
+    say,
+    say_json,
+)
+
+if TYPE_CHECKING:
+    from planner.error_curve import ErrorCurve
+    from planner.plan import Plan
+    from planner.sector_size import Recommendation
+
+SizesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--sizes",
+        metavar="DEG,DEG,...",
+        help="Sector sizes, such as 60,30,8. [default: the declared one and smaller]",
+    ),
+]
+SizesFromOption = Annotated[
+    str,
+    typer.Option(
+        "--sizes-from",
+        metavar="own|subset",
+        help="own: each size a scan of its own; subset: the declared scan's middle rays.",
+    ),
+]
+TierOption = Annotated[
+    str | None,
+    typer.Option(
+        "--tier",
+        metavar="noise|linear|turbulent",
+        help="How to predict. [default: turbulent, or linear without turbulence]",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    app.command("errors")(errors)
+
+
+def errors(
+    site: SiteArgument,
+    sizes: SizesOption = None,
+    sizes_from: SizesFromOption = "own",
+    tier: TierOption = None,
+    fidelity: FidelityOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Predicted error of speed and direction per sector size, and the recommended size."""
+    from planner.commands.choices import chosen, numbers
+    from planner.commands.load import load_plan
+
+    kind = chosen("--sizes-from", sizes_from, ("own", "subset"))
+    by = None if tier is None else chosen("--tier", tier, ("noise", "linear", "turbulent"))
+    sizes_deg = None if sizes is None else numbers("--sizes", sizes)
+    plan = load_plan(site, fidelity)
+    curves = plan.errors(tier=by, sizes_deg=sizes_deg, sizes_from=kind)
+    if json:
+        say_json([_document(curve, plan.recommendation(curve)) for curve in curves])
+        return
+    if not curves:
+        say("No sector scan and no pair has a target: there is no error to predict.")
+    for curve in curves:
+        _print(plan, curve)
+    remark(
+        "Errors are retrieved less true, over the site's wind; scan: one scan; 10 min: its ten-minute mean against a cup at the target; "
+        "slope: mast = slope · lidar; – : the tier cannot know it.",
+        quiet=quiet,
+    )
+
+
+def _document(curve: "ErrorCurve", advice: "Recommendation") -> dict[str, object]:
+    return {
+        "lidar" if curve.lidar else "pair": curve.lidar or curve.scan,
+        "scan": curve.scan,
+        "target": curve.target,
+        "tier": curve.tier,
+        "reference": curve.reference,
+        "recommended_sector_deg": advice.sector_deg,
+        "reason": advice.reason,
+        "states": curve.states,
+        "sizes": [size.as_dict() for size in curve.sizes],
+    }
+
+
+def _print(plan: "Plan", curve: "ErrorCurve") -> None:
+    from planner.commands.table import print_table
+
+    columns = {
+        "scan bias m/s": ("speed_bias_mps", "+.3f"),
+        "scan ± m/s": ("speed_std_mps", ".3f"),
+        "scan ± °": ("direction_std_deg", ".2f"),
+        "10 min bias m/s": ("mean10_speed_bias_mps", "+.3f"),
+        "10 min ± m/s": ("mean10_speed_std_mps", ".3f"),
+        "10 min ± °": ("mean10_direction_std_deg", ".2f"),
+        "slope": ("slope", ".4f"),
+        "residual ± m/s": ("residual_std_mps", ".3f"),
+    }
+    rows = [
+        (
+            "–" if size.sector_deg is None else f"{size.sector_deg:g}",
+            str(size.rays),
+            str(size.scans_per_10min),
+            "–" if size.condition is None else f"{size.condition:.1f}",
+            *(
+                "–" if (value := size.values[name]) is None else format(value, how)
+                for name, how in columns.values()
+            ),
+        )
+        for size in curve.sizes
+    ]
+    title = f"{curve.scan} → {curve.target}, {curve.tier} tier, {curve.states} states of the wind"
+    print_table(title, ("sector °", "rays", "scans/10 min", "condition", *columns), rows)
+    from planner.commands.options import say
+
+    advice = plan.recommendation(curve)
+    say(
+        f"Recommended: {advice.reason}.\n"
+        if advice.sector_deg is not None
+        else f"No recommendation: {advice.reason}.\n"
+    )

@@ -1,0 +1,37 @@
+"""`lidarplan report SITE [SITE2]`: all of it on one page, with its tables beside it."""
+
+from typing import Annotated
+
+import typer
+
+from planner.commands.options import DEFAULT_OUT, FidelityOption, JsonOption, OutOption, QuietOption, SiteArgument, remark, say, say_json
+
+SecondSite = Annotated[str | None, typer.Argument(metavar="[SITE2]", help="A second site file, to be compared with the first.", show_default=False)]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    app.command("report")(report)
+
+
+def report(
+    site: SiteArgument,
+    site2: SecondSite = None,
+    out: OutOption = DEFAULT_OUT,
+    fidelity: FidelityOption = None,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Findings, map, pointing, crossings, wakes, errors and the 3-D scene in one file, report.html."""
+    from geometry.errors import InputError
+    from planner.commands.load import load_plan
+    from planner.report import write_report
+
+    if site == site2 == "-":
+        raise InputError("both sites were to come from standard input; give one of them as a file")
+    plans = [load_plan(name, fidelity) for name in (site, site2) if name is not None]
+    files = write_report(plans, out, progress=lambda text: remark(text, quiet=quiet))
+    if json:
+        say_json({"report": str(files[0]), "tables": [str(path) for path in files[1:]]})
+    else:
+        say(str(files[0]))

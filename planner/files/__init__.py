@@ -1,0 +1,1 @@
+"""Files on one side, a `Site` on the other."""

@@ -1,0 +1,212 @@
+"""Site -> Plan: everything that follows from the site file, each computed once, when first asked for.
+
+What is below (checks, figures, scene, report, tables) reads the Plan and computes nothing.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from geometry.angles import SectorSet, difference_deg, wrap_180_deg
+from geometry.disturbed import any_of
+from planner.crossings import PairCrossing, crossings
+from planner.error_curve import (
+    ErrorCurve,
+    SizesFrom,
+    air_of_pair,
+    airs_of_scan,
+    default_tier,
+    pair_curve,
+    sector_curve,
+)
+from planner.exclusion import Exclusion, Near, exclusions, near_wakes, wanted_directions
+from planner.fidelity import Air, Effect, earth_model, geometric_effects, left_out, wind_effects
+from planner.obstruction import Obstruction, obstructions
+from planner.places import Places
+from planner.pointing import Pointing, pointings
+from planner.scan_layout import ScanLayout, lay_out
+from planner.sector_size import Recommendation, recommend
+from planner.site import Pair, Site
+from reconstruct.prediction import Tier
+from planner.wind_climate import largest_gust_mps
+from planner.wind_rose import prevailing_deg
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from planner.tradeoff import Progress, Trade
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A site and what follows from it."""
+
+    site: Site
+
+    @cached_property
+    def exact_places(self) -> Places:
+        """Frame and positions by the exact ellipsoid, which every effect is measured against."""
+        return Places(self.site)
+
+    @cached_property
+    def geometric_effects(self) -> tuple[Effect, ...]:
+        """Size of what a flat map leaves out, and what of it is modelled."""
+        return geometric_effects(self.exact_places)
+
+    @cached_property
+    def places(self) -> Places:
+        """Frame and positions by the cheapest model of the Earth that the site's tolerance allows."""
+        return Places(self.site, earth_model(self.exact_places, self.geometric_effects))
+
+    @cached_property
+    def fidelity(self) -> tuple[Effect, ...]:
+        """Every effect that could be left out, with its size here, and whether it is."""
+        return (*self.geometric_effects, *wind_effects(self.site, self._airs))
+
+    @cached_property
+    def _airs(self) -> tuple[Air, ...]:
+        """Each sector scan (at its widest and narrowest) and pair in the middle of the wind's speeds, from each of its directions."""
+        airs = [
+            air
+            for item in self.exclusions
+            if self.layout[item.scan].spec.type == "sector"
+            for air in airs_of_scan(self.places, self.layout[item.scan], item)
+        ]
+        return (*airs, *(air_of_pair(self.places, pair, *self._pair(pair)) for pair in self.site.pairs))
+
+    def _pair(self, pair: Pair) -> tuple[tuple[ScanLayout, ...], SectorSet]:
+        """The scans of a pair, and the directions in which a wake touches what any of them measures."""
+        met = [item for item in self.exclusions if item.scan in pair.scans and item.target == pair.target]
+        return tuple(self.layout[name] for name in pair.scans), any_of(item.excluded for item in met)
+
+    @cached_property
+    def layouts(self) -> tuple[ScanLayout, ...]:
+        """Every scan laid out in space, in the order of the site file."""
+        return tuple(lay_out(self.places, spec) for spec in self.site.scans)
+
+    @cached_property
+    def layout(self) -> Mapping[str, ScanLayout]:
+        """The same by the scan's name."""
+        return {layout.name: layout for layout in self.layouts}
+
+    @cached_property
+    def pointings(self) -> tuple[Pointing, ...]:
+        """Every lidar at every target."""
+        return pointings(self.places, self.layouts)
+
+    @cached_property
+    def crossings(self) -> tuple[PairCrossing, ...]:
+        """Every two beams of every pair, by the exact ellipsoid: a gap is not to be an artefact of a flat map."""
+        return crossings(self.exact_places, self.layouts)
+
+    @cached_property
+    def exclusions(self) -> tuple[Exclusion, ...]:
+        """What wakes take from every scan at every target."""
+        return exclusions(self.places, self.layouts)
+
+    @cached_property
+    def obstructions(self) -> tuple[Obstruction, ...]:
+        """Everything solid that a ray touches or nearly touches."""
+        return obstructions(self.places, self.layouts)
+
+    def errors(
+        self,
+        *,
+        tier: Tier | None = None,
+        sizes_deg: Sequence[float] | None = None,
+        sizes_from: SizesFrom = "own",
+    ) -> tuple[ErrorCurve, ...]:
+        """Predicted error of every sector scan at each of its targets, for each size, then of every pair.
+
+        Parameters
+        ----------
+        tier
+            Default: turbulent where the site declares turbulence, else linear.
+        sizes_deg
+            Sector sizes [deg]; default: each scan's declared one and the usual smaller ones.
+        sizes_from
+            "own" or "subset", see `error_curve.sector_curve`.
+        """
+        simpler = left_out(self.fidelity)
+        chosen = tier or default_tier(self.site, simpler)
+        sectors = [
+            sector_curve(
+                self.places,
+                self.layout[item.scan],
+                item,
+                tier=chosen,
+                sizes_deg=sizes_deg,
+                sizes_from=sizes_from,
+                left_out=simpler,
+            )
+            for item in self.exclusions
+            if self.layout[item.scan].spec.type == "sector"
+        ]
+        pairs = [
+            pair_curve(self.places, pair, *self._pair(pair), tier=chosen, left_out=simpler)
+            for pair in self.site.pairs
+        ]
+        return (*sectors, *pairs)
+
+    @cached_property
+    def default_errors(self) -> tuple[ErrorCurve, ...]:
+        """The errors by the default tier and sizes, once."""
+        return self.errors()
+
+    def trades(self, *, rng: "Generator", progress: "Progress | None" = None) -> "tuple[Trade, ...]":
+        """Time and error of every cheaper way on this machine: each call measures anew."""
+        from planner.tradeoff import trades
+
+        return trades(self.exact_places, self._airs[0] if self._airs else None, rng=rng, progress=progress)
+
+    def recommendation(self, curve: ErrorCurve) -> Recommendation:
+        """The recommended sector size of a curve, with its reason."""
+        return recommend(curve, self.site.tolerance)
+
+    @cached_property
+    def wanted(self) -> SectorSet:
+        """The wind directions that count."""
+        return wanted_directions(self.site)
+
+    @cached_property
+    def prevailing_deg(self) -> float:
+        """Where the wanted wind mostly comes from [deg]; NaN where from everywhere alike."""
+        return prevailing_deg(self.site, self.wanted)
+
+    def largest_gust_mps(self, layout: ScanLayout) -> float:
+        """The fastest wanted wind with its gusts, at a scan's fastest target [m/s]."""
+        return largest_gust_mps(self.site, layout.targets)
+
+    @cached_property
+    def longitude_latitude_deg(self) -> tuple[float, float]:
+        """Where the site is [deg east, deg north]."""
+        longitude, latitude, _ = self.places.frame.geographic(self.places.origin_m)
+        return float(longitude), float(latitude)
+
+    @cached_property
+    def convergence_deg(self) -> float:
+        """Meridian convergence in the middle of the site [deg]."""
+        return float(self.places.frame.convergence_deg(self.places.origin_m))
+
+    @cached_property
+    def from_meridian_deg(self) -> float | None:
+        """Distance in longitude from the CRS' central meridian [deg]; None where it has none."""
+        meridian_deg = self.places.frame.central_meridian_deg
+        if meridian_deg is None:
+            return None
+        return abs(float(wrap_180_deg(self.longitude_latitude_deg[0] - meridian_deg)))
+
+    def axis_from_wind_deg(self, layout: ScanLayout) -> float | None:
+        """Angle between a sector's axis and the prevailing wind's line [deg], 0 to 90.
+
+        None for other scans, and for a wind that comes from everywhere alike.
+        """
+        if layout.spec.type != "sector" or self.prevailing_deg != self.prevailing_deg:
+            return None
+        apart = abs(float(difference_deg(layout.axis_azimuth_deg, self.prevailing_deg)))
+        return min(apart, 180.0 - apart)
+
+    def near_wakes(self, exclusion: Exclusion) -> tuple[Near, ...]:
+        """Each turbine's and obstacle's distance from what a scan measures, in its own diameters."""
+        return near_wakes(self.places, self.layout[exclusion.scan], exclusion.target)

@@ -1,0 +1,208 @@
+"""Plan -> Scene: what stands on the site, where the beams go and what they measure, in the site's local metres."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.beams import beam_to
+from geometry.crossing import cross
+from geometry.errors import InputError
+from planner.crossings import PairCrossing, beam_line
+from planner.obstruction import reach_m
+from planner.palette import EXCLUDED, OBSTACLE, lidar_colour
+from planner.plan import Plan
+from planner.scan_layout import ScanLayout
+from planner.scene import Label, Layer, Points, Scene, layers, views
+from planner.scene.model import positions_m
+from planner.scene.structures import obstacle
+
+GROUND_M = 0.0  # the site's local frame has its origin at ground level
+WAKE_DIAMETERS = 8  # how much of a wake is drawn; a wake goes on
+RING_SHARE = (0.8, 1.0)  # inner and outer radius of the excluded directions, of `ring_m`
+RING_OF_RANGE = 0.2  # outer radius, as a share of the range to the target
+CLOSE_UP_M = 150.0  # half of what is seen around the first target
+WAKE_LIFT_M = 0.5  # wakes end above the ground: two surfaces in one place flicker
+AWAY_NEAR = ("wakes", "excluded", "north and scale")  # layers that would cover the close-up
+MOST_RAYS = 400  # a scan of more is drawn with every so manieth ray
+
+
+def plan_scene(plan: Plan) -> Scene:
+    """Build the 3-D scene of a plan; heights are above the site's ground.
+
+    Raises
+    ------
+    InputError
+        If the site has nothing that could be drawn.
+    """
+    standing = [*_scans(plan), *_targets(plan), *_structures(plan), *_wakes(plan), *_crossings(plan)]
+    if not standing:
+        raise InputError("the site has nothing to draw: give at least one lidar, mast, turbine or target")
+    ground = layers.ground_layers(standing, height_m=GROUND_M)
+    named = np.stack([label.at_m for layer in standing for label in layer.labels])
+    points = np.concatenate([positions_m(item) for layer in (*standing, ground[2]) for item in layer.items])
+    wind_deg = plan.prevailing_deg
+    turned = bool(plan.site.turbines) and bool(np.isfinite(wind_deg))
+    overview = views.overview(points, named, facing_deg=wind_deg if turned else None)
+    around = [*_excluded(plan)]
+    hidden = tuple(layer.name for layer in (*around, ground[2], *standing) if layer.name.startswith(AWAY_NEAR))
+    note = f"wakes and rotors in the prevailing wanted wind, from {wind_deg:.0f}°" if turned else ""
+    return Scene(plan.site.name, (*ground, *around, *standing), (overview, *_close_ups(plan, overview, hidden)), note=note)
+
+
+def _local_directions(plan: Plan, layout: ScanLayout, rays: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Head (3,), azimuths and elevations (ray,) of a scan in the site's frame, whose up is not quite the lidar's."""
+    scan = layout.scan
+    ends = plan.places.beam_local_m(
+        layout.lidar, scan.azimuth_deg[rays], scan.elevation_deg[rays], np.full(len(scan.azimuth_deg[rays]), 1000.0)
+    )
+    head = plan.places.local_m(layout.lidar.position)
+    beam = beam_to(ends - head)
+    return head, beam.azimuth_deg, beam.elevation_deg
+
+
+def _scans(plan: Plan) -> Iterator[Layer]:
+    named: set[str] = set()
+    for layout in plan.layouts:
+        layer = _scan(plan, layout)
+        if layout.lidar.name in named:  # a lidar with two scans has one name and one dot
+            kept = tuple(item for item in layer.items if not isinstance(item, Label) and not (isinstance(item, Points) and item.is_symbol))
+            layer = replace(layer, items=kept)
+        named.add(layout.lidar.name)
+        yield layer
+
+
+def _scan(plan: Plan, layout: ScanLayout) -> Layer:
+    colour = lidar_colour(layout.lidar_index)
+    step = -(-layout.scan.count // MOST_RAYS)
+    head, azimuth_deg, elevation_deg = _local_directions(plan, layout, slice(None, None, step))
+    seen_m = float(reach_m(layout).max())
+    last_m = max(layout.gates.last_m, seen_m) if layout.gates else seen_m
+    measured_m, probe_m = layout.target_range_m or last_m, layout.probe.length_m
+    if layout.scan.count == 1:
+        return layers.stare_layer(
+            layout.lidar.name,
+            colour,
+            head,
+            float(azimuth_deg[0]),
+            float(elevation_deg[0]),
+            gate_ranges_m=layout.gates.centres_m if layout.gates else [measured_m],
+            measured_range_m=measured_m,
+            probe_length_m=probe_m,
+            ground_m=GROUND_M,
+            scan=layout.name,
+        )
+    return layers.fan_layer(
+        layout.lidar.name,
+        colour,
+        head,
+        azimuth_deg,
+        elevation_deg,
+        reach_m=last_m,
+        measured_range_m=measured_m,
+        probe_length_m=probe_m,
+        closed=layout.spec.type == "ppi",
+        scan=layout.name,
+    )
+
+
+def _targets(plan: Plan) -> Iterator[Layer]:
+    """Targets that no mast carries, with their names: a mast's name says enough."""
+    free = [target for target in plan.site.targets if target.mast is None]
+    idle = [lidar for lidar in plan.site.lidars if all(spec.lidar != lidar.name for spec in plan.site.scans)]
+    for name, colour, things in (
+        ("targets", "#111111", [(target.name, plan.site.target_position_m(target)) for target in free]),
+        ("lidars without a scan", "#52606d", [(lidar.name, lidar.position) for lidar in idle]),
+    ):
+        spots = [plan.places.local_m(position) for _, position in things]
+        if spots:
+            dots = Points(np.stack(spots), size_px=12.0, hover=tuple(text for text, _ in things))
+            yield Layer(name, colour, (dots, *(Label(text, at) for (text, _), at in zip(things, spots, strict=True))))
+
+
+def _structures(plan: Plan) -> Iterator[Layer]:
+    site, local = plan.site, plan.places.local_m
+    if site.masts:
+        bases = local([mast.position for mast in site.masts])
+        yield layers.mast_layer(
+            [mast.name for mast in site.masts], bases, [mast.height_m for mast in site.masts], [mast.width_m for mast in site.masts]
+        )
+    if site.turbines:
+        yield layers.turbine_layer(
+            [turbine.name for turbine in site.turbines],
+            local([turbine.position for turbine in site.turbines]),
+            [turbine.hub_height_m for turbine in site.turbines],
+            [turbine.rotor_diameter_m for turbine in site.turbines],
+            [turbine.tower_diameter_m for turbine in site.turbines],
+            wind_from_deg=plan.prevailing_deg if np.isfinite(plan.prevailing_deg) else 0.0,
+        )
+    if site.obstacles:
+        boxes = [
+            obstacle(
+                local(item.position),
+                width_m=item.width_m,
+                length_m=item.length_m,
+                height_m=item.height_m,
+                azimuth_deg=item.azimuth_deg + plan.convergence_deg,
+            )
+            for item in site.obstacles
+        ]
+        names = [Label(item.name, local(item.position) + [0.0, 0.0, item.height_m], rank=2) for item in site.obstacles]
+        yield Layer("obstacles", OBSTACLE, (*boxes, *names))
+
+
+def _wakes(plan: Plan) -> Iterator[Layer]:
+    """Wakes in the prevailing wind; of what blows from everywhere alike none is drawn."""
+    turbines, wind_deg = plan.site.turbines, plan.prevailing_deg
+    if turbines and np.isfinite(wind_deg):
+        diameters = [turbine.rotor_diameter_m for turbine in turbines]
+        yield layers.wake_layer(
+            [turbine.name for turbine in turbines],
+            plan.places.hubs_m,
+            diameters,
+            wind_from_deg=round(wind_deg),
+            decay=plan.site.wakes.decay,
+            length_m=WAKE_DIAMETERS * max(diameters),
+            ground_m=GROUND_M + WAKE_LIFT_M,
+        )
+
+
+def _excluded(plan: Plan) -> Iterator[Layer]:
+    """On the ground around the first target, the directions in which a wake touches what the worst scan measures."""
+    items = [item for item in plan.exclusions if item.excluded.sectors]
+    if items:
+        worst = max(items, key=lambda item: item.excluded.width_deg)
+        target = plan.places.local_m(plan.site.target_position_m(worst.target))
+        radius_m = RING_OF_RANGE * worst.range_m
+        yield layers.direction_layer(
+            "excluded",
+            EXCLUDED,
+            [target[0], target[1], GROUND_M],
+            RING_SHARE[1] * radius_m,
+            [(sector.from_deg, sector.width_deg) for sector in worst.excluded.sectors],
+            inner_m=RING_SHARE[0] * radius_m,
+            about=f"winds that bring a wake into what {worst.scan} measures",
+        )
+
+
+def _crossings(plan: Plan) -> Iterator[Layer]:
+    """Where the beams of each pair come closest, all in one layer; parallel beams nowhere."""
+    met = [layer for crossing in plan.crossings for layer in _crossing(plan, crossing)]
+    if met:
+        yield replace(met[0], name="crossings", items=tuple(item for layer in met for item in layer.items))
+
+
+def _crossing(plan: Plan, met: PairCrossing) -> Iterator[Layer]:
+    lines = [beam_line(plan.places, plan.layout[name], met.target) for name in (met.scan1, met.scan2)]
+    points = cross(*lines[0], *lines[1])
+    if np.all(np.isfinite([points.point1_m, points.point2_m])):
+        text = f"{met.pair}: {met.opening_angle_deg:.0f}°, gap {met.gap_m:.1f} m"
+        yield layers.crossing_layer("crossing", text, points.point1_m, points.point2_m, ground_m=GROUND_M)
+
+
+def _close_ups(plan: Plan, overview: views.View, hidden: tuple[str, ...]) -> Iterator[views.View]:
+    """A second view, of the first target."""
+    if plan.site.targets:
+        target = plan.places.local_m(plan.site.target_position_m(plan.site.targets[0]))
+        yield views.close_up(target, CLOSE_UP_M, views.azimuth_of_deg(overview), name=f"at {plan.site.targets[0].name}", without=hidden)

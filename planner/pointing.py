@@ -1,0 +1,82 @@
+"""Where each lidar points for each target: azimuth from true north, grid north and as the head counts it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.angles import wrap_360_deg
+from geometry.beams import beam_to
+from geometry.earth import refraction_lift_m
+from geometry.errors import InputError
+from planner.places import Places
+from planner.scan_layout import ScanLayout
+from planner.site import Lidar
+
+
+class Pointing(NamedTuple):
+    """One lidar and one target; angles of the straight line, on the exact ellipsoid."""
+
+    lidar: str
+    target: str
+    azimuth_true_deg: float
+    azimuth_grid_deg: float
+    azimuth_head_deg: float
+    elevation_deg: float  # above the horizontal at the head, of the straight line
+    elevation_head_deg: float
+    range_m: float
+    gate_index: int | None  # of the lidar's scan at this target; None without gates there
+    gate_centre_m: float | None
+    convergence_deg: float
+    refraction_deg: float  # add to the elevation to hit the target: the beam bends down by this much; not inside elevation_deg
+    scan: str | None
+
+
+def pointings(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[Pointing, ...]:
+    """Point every lidar at every target, in the order of the site file.
+
+    Raises
+    ------
+    InputError
+        If the site has no lidar or no target.
+    """
+    site = places.site
+    if not site.lidars or not site.targets:
+        raise InputError(
+            f"the site has {len(site.lidars)} lidars and {len(site.targets)} targets; pointing needs at least one "
+            "of each: add them to the site file"
+        )
+    return tuple(
+        point(places, lidar, target.name, _scan_at(layouts, lidar.name, target.name))
+        for lidar in site.lidars
+        for target in site.targets
+    )
+
+
+def point(places: Places, lidar: Lidar, target: str, layout: ScanLayout | None) -> Pointing:
+    """Point one lidar at one target (or hard target), always by the exact model."""
+    position = places.site.target_position_m(target)
+    beam = beam_to(places.frame.enu_m(lidar.position, position))
+    azimuth_deg, elevation_deg, range_m = (float(value) for value in beam)
+    head_azimuth, head_elevation = places.mounting(lidar).to_head(azimuth_deg, elevation_deg)
+    convergence_deg = places.convergence_deg(lidar)
+    gate = None if layout is None else layout.gate_at(range_m)
+    return Pointing(
+        lidar=lidar.name,
+        target=target,
+        azimuth_true_deg=azimuth_deg,
+        azimuth_grid_deg=float(wrap_360_deg(azimuth_deg - convergence_deg)),
+        azimuth_head_deg=float(wrap_360_deg(head_azimuth)),
+        elevation_deg=elevation_deg,
+        elevation_head_deg=float(head_elevation),
+        range_m=range_m,
+        gate_index=None if gate is None else gate[0],
+        gate_centre_m=None if gate is None else gate[1],
+        convergence_deg=convergence_deg,
+        refraction_deg=float(np.rad2deg(refraction_lift_m(range_m) / range_m)) if range_m else 0.0,
+        scan=None if layout is None else layout.name,
+    )
+
+
+def _scan_at(layouts: tuple[ScanLayout, ...], lidar: str, target: str) -> ScanLayout | None:
+    """The lidar's first scan that looks at the target."""
+    return next((item for item in layouts if item.lidar.name == lidar and target in item.targets), None)

@@ -1,0 +1,258 @@
+"""The report: everything about one site, or two side by side, on one page that loads nothing, and its tables as CSV.
+
+Names in a site file are untrusted text. Every one reaches the page through the template's escaping; the page's content
+security policy forbids loading anything and runs only the scripts whose digests it lists, so that a script in a name
+would not run even if it got there.
+"""
+
+from base64 import b64encode
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from re import DOTALL, findall
+
+from geometry.errors import UnavailableError
+from planner import palette
+from planner.assumptions import assumptions
+from planner.checks import findings
+from planner.exclusion import Exclusion
+from planner.figures.map_layers import most_lost
+from planner.figures.sector_error import sector_error
+from planner.figures.site_map import site_map
+from planner.figures.wake_rose import wake_rose
+from planner.finding import Finding
+from planner.output import output_folder
+from planner.plan import Plan
+from planner.plan_scene import plan_scene
+from planner.report_errors import Entry, error_entries, tier_curve
+from planner.report_numbers import KeyNumber, finding_counts, key_numbers
+from planner.report_tables import (
+    crossing_table,
+    directions,
+    errors_table,
+    fidelity_table,
+    findings_table,
+    pointing_table,
+    scan_table,
+    size_table,
+    unknown_numbers,
+    wake_table,
+)
+from planner.report_values import Column, Table, csv_text, percent, quantity
+from planner.scene import Scene
+
+PAGE = "report.html"
+SITE_COLUMN = Column("site", "site")
+PICTURE_PX = (1400, 875)
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class SiteReport:
+    """What the page says about one site; each part is made when first asked for, and once."""
+
+    plan: Plan
+    number: int  # on the page, from 1
+
+    @cached_property
+    def findings(self) -> list[Finding]:
+        """Errors first."""
+        return findings(self.plan)
+
+    @cached_property
+    def errors(self) -> list[Entry]:
+        """Every predicted curve."""
+        return error_entries(self.plan)
+
+    @cached_property
+    def numbers(self) -> list[KeyNumber]:
+        """What a reader looks for first."""
+        return key_numbers(self.plan, self.findings, self.errors)
+
+    @cached_property
+    def tables(self) -> dict[str, Table]:
+        """The tables, by name."""
+        made = (
+            findings_table(self.findings),
+            pointing_table(self.plan),
+            crossing_table(self.plan),
+            wake_table(self.plan),
+            errors_table(self.errors),
+            scan_table(self.plan),
+            fidelity_table(self.plan.fidelity),
+        )
+        return {table.name: table for table in made}
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The 3-D scene."""
+        return plan_scene(self.plan)
+
+
+CSV_TABLES = ("pointing", "findings", "wakes", "crossings", "errors")
+
+
+def write_report(plans: Sequence[Plan], folder: Path, *, progress: Progress = lambda _: None) -> list[Path]:
+    """Write the report of one or two plans: `report.html` and its tables as CSV.
+
+    Parameters
+    ----------
+    plans
+        One, or two to be compared.
+    folder
+        Where the files go; they appear there all together, or none of them.
+    progress
+        Is told what is being done.
+
+    Returns
+    -------
+    list of Path
+        The page, then the tables.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to, or a plan's numbers make no report.
+    """
+    reports = [SiteReport(plan, number) for number, plan in enumerate(plans, start=1)]
+    with output_folder(folder) as staging:
+        texts = {f"{name}.csv": _csv(reports, name) for name in CSV_TABLES}
+        texts = {PAGE: _page(reports, progress), **texts}
+        for name, text in texts.items():
+            (staging / name).write_text(text, encoding="utf-8")
+    return [folder / name for name in texts]
+
+
+def report_html(plans: Sequence[Plan], *, progress: Progress = lambda _: None) -> str:
+    """The page alone, as text."""
+    return _page([SiteReport(plan, number) for number, plan in enumerate(plans, start=1)], progress)
+
+
+def _csv(reports: Sequence[SiteReport], name: str) -> str:
+    """One table of all sites, the site's name in the first column."""
+    tables = [(report.plan.site.name, report.tables[name]) for report in reports]
+    rows = [(site, *row) for site, table in tables for row in table.rows]
+    return csv_text((SITE_COLUMN, *tables[0][1].columns), rows)
+
+
+def _page(reports: Sequence[SiteReport], progress: Progress) -> str:
+    from importlib.resources import files
+
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    sites = [_site(report, progress) for report in reports]
+    scripts = [script for site in sites for script in findall(r"<script[^>]*>(.*?)</script>", str(site["scene_div"]), DOTALL)]
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(files("planner.templates").joinpath("report.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        sites=[{**site, "scene_div": Markup(site["scene_div"])} for site in sites],
+        rows=list(zip(*(report.numbers for report in reports), strict=True)),
+        policy=_policy(scripts),
+        palette=palette,
+        quantity=quantity,
+    )
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """Nothing may be loaded; of scripts only these run (plotly's 3-D needs eval)."""
+    digests = " ".join(f"'sha256-{b64encode(sha256(script.encode('utf-8')).digest()).decode()}'" for script in scripts)
+    return (
+        f"default-src 'none'; script-src {digests} 'unsafe-eval'; style-src 'unsafe-inline'; "
+        "img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
+    """Everything that the template needs of one site."""
+    plan = report.plan
+    progress(f"{plan.site.name}: tables and figures")
+    numbers = {
+        "number": report.number,
+        "site": plan.site,
+        "crs": plan.site.crs,
+        "summary": _summary(report),
+        "numbers": report.numbers,
+        "tables": report.tables,
+        "map": _inline(site_map(plan)),
+        "rose": _inline(wake_rose(plan)),
+        "free": [_free_sentence(item) for item in most_lost(plan)],
+        "errors": [_error_part(entry) for entry in report.errors],
+        "assumptions": assumptions(plan.site),
+        "findings": report.findings,
+        "convergence_deg": plan.convergence_deg,
+    }
+    progress(f"{plan.site.name}: scene")
+    return {**numbers, **_scene_part(report)}
+
+
+def _summary(report: SiteReport) -> str:
+    """One line: counts of findings and the main numbers."""
+    main = {number.label: number.text for number in report.numbers}
+    parts = [f"{finding_counts(report.findings).capitalize()}", main["on the site"]]
+    for label, words in (
+        ("opening angle of pairs [°]", "opening angle {}°"),
+        ("of that wind lost to wakes, worst scan", "{} of the wanted wind lost to wakes"),
+        ("recommended sector", "recommended sector {}"),
+    ):
+        if main[label] != "–" and not main[label].startswith("none"):
+            parts.append(words.format(main[label]))
+    return "; ".join(parts) + "."
+
+
+def _free_sentence(item: Exclusion) -> dict[str, str]:
+    """What the site file declares beside what is found, for the scan at a target that wakes take most from."""
+    return {
+        "scan": item.scan,
+        "target": item.target,
+        "declared": directions(item.wanted),
+        "found": directions(item.free),
+        "lost": directions(item.wanted.intersection(item.excluded)),
+        "share": percent(item.lost_share),
+        "unused": directions(item.free.difference(item.wanted)),
+    }
+
+
+def _error_part(entry: Entry) -> dict[str, object]:
+    """Table, figure and words of one curve."""
+    best = entry["recommended_sector_deg"]
+    title = f"{entry['scan']} at {entry['target']}, tier {entry['tier']}"
+    figure = sector_error([tier_curve(entry)], title=title, recommended_deg=best) if len(entry["sizes"]) > 1 else None
+    return {"entry": entry, "table": size_table(entry), "figure": _inline(figure), "unknown": unknown_numbers(entry)}
+
+
+def _scene_part(report: SiteReport) -> dict[str, object]:
+    """The interactive scene, and its picture or why there is none."""
+    from planner.scene import plotly_adapter
+
+    first = report.number == 1
+    name = f"scene-{report.number}"
+    try:
+        picture, reason = _inline(_picture(report.scene)), ""
+    except UnavailableError as error:
+        picture, reason = None, str(error)
+    return {
+        "scene_div": plotly_adapter.div(report.scene, with_library=first, name=name),
+        "picture": picture,
+        "no_picture": reason,
+    }
+
+
+def _picture(scene: Scene) -> bytes:
+    from planner.scene.pyvista_adapter import render_image
+
+    pixels = render_image(scene, width_px=PICTURE_PX[0], height_px=PICTURE_PX[1])
+    from PIL import Image
+
+    buffer = BytesIO()
+    Image.fromarray(pixels).save(buffer, format="PNG")
+    return buffer.getvalue()
+
+
+def _inline(picture: bytes | None) -> str | None:
+    """A PNG as text for the page."""
+    return None if picture is None else f"data:image/png;base64,{b64encode(picture).decode()}"

@@ -1,0 +1,142 @@
+"""How often the wind comes from where: uniform, or a rose that was measured."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from geometry.angles import FULL_CIRCLE_DEG, Sector, SectorSet, circular_mean_deg
+from geometry.arrays import FloatArray
+from geometry.errors import InputError
+from planner.site import Site
+
+# Directions that add up to less than this share of a full resultant have no mean worth naming.
+UNIFORM_RESULTANT = 0.05
+
+WEIBULL_COLUMNS = ("weibull_scale_mps", "weibull_shape")
+COLUMNS = "direction_deg, share and, optionally, weibull_scale_mps with weibull_shape"
+
+
+@dataclass(frozen=True, eq=False)
+class Rose:
+    """Equal sectors around the circle, the first centred on its direction; shares add up to 1."""
+
+    direction_deg: FloatArray  # (sector,) middles, ascending
+    share: FloatArray  # (sector,)
+    weibull_scale_mps: FloatArray | None = None  # (sector,)
+    weibull_shape: FloatArray | None = None  # (sector,)
+
+    @property
+    def sectors(self) -> tuple[Sector, ...]:
+        """The sectors themselves."""
+        width = FULL_CIRCLE_DEG / len(self.share)
+        return tuple(Sector((middle - width / 2) % FULL_CIRCLE_DEG, width) for middle in self.direction_deg)
+
+
+def share_within(site: Site, directions: SectorSet) -> float:
+    """Share of the wind that comes from some directions: by the site's rose, else uniform; 0 to 1."""
+    if site.wind is None or site.wind.rose is None:
+        return directions.width_deg / FULL_CIRCLE_DEG
+    rose = load_rose(site.wind.rose)
+    inside = [
+        directions.intersection(SectorSet.of([sector])).width_deg / sector.width_deg for sector in rose.sectors
+    ]
+    return float(np.dot(inside, rose.share))
+
+
+@lru_cache(maxsize=8)
+def load_rose(path: Path) -> Rose:
+    """Read a wind rose.
+
+    Parameters
+    ----------
+    path
+        A CSV of direction_deg (middles of equal sectors), share (in any unit; made to add up to 1) and,
+        optionally, weibull_scale_mps with weibull_shape.
+
+    Returns
+    -------
+    Rose
+        Sectors in ascending order.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, the directions are not equal sectors around the whole
+        circle, or a number is negative or missing.
+    """
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path, skipinitialspace=True)
+    except (OSError, ValueError) as error:
+        raise InputError(f"wind rose {path} cannot be read ({error}); it has to be a CSV of {COLUMNS}") from error
+    _check_columns(path, list(map(str, table.columns)))
+    try:
+        table = table.astype(float).sort_values("direction_deg")
+    except ValueError as error:
+        raise InputError(f"wind rose {path} holds something that is no number: {error}") from error
+    directions, share = table["direction_deg"].to_numpy(), table["share"].to_numpy()
+    scale_mps, shape = (table[name].to_numpy() if name in table else None for name in WEIBULL_COLUMNS)
+    _check_directions(path, directions)
+    _check_numbers(path, share, scale_mps, shape)
+    return Rose(directions, share / share.sum(), scale_mps, shape)
+
+
+def _check_columns(path: Path, columns: list[str]) -> None:
+    wanted = {"direction_deg", "share"}
+    if not wanted.union(WEIBULL_COLUMNS).isdisjoint(set(columns) - wanted):
+        wanted.update(WEIBULL_COLUMNS)  # one of the two says nothing
+    missing = sorted(wanted - set(columns))
+    if missing:
+        raise InputError(
+            f"wind rose {path} has the columns {', '.join(columns)}; {', '.join(missing)} is missing: "
+            f"it has to be a CSV of {COLUMNS}"
+        )
+
+
+def _check_directions(path: Path, directions: FloatArray) -> None:
+    steps = np.diff(np.append(directions, directions[:1] + FULL_CIRCLE_DEG))
+    if len(directions) < 2 or not np.allclose(steps, FULL_CIRCLE_DEG / len(directions), atol=1e-6):
+        raise InputError(
+            f"wind rose {path}: the directions {directions.tolist()} are not equal sectors around the whole "
+            "circle; give, for example, 0, 30 ... 330"
+        )
+
+
+def _check_numbers(
+    path: Path, share: FloatArray, scale_mps: FloatArray | None, shape: FloatArray | None
+) -> None:
+    if not (np.isfinite(share).all() and (share >= 0).all() and share.sum() > 0):
+        raise InputError(
+            f"wind rose {path}: the shares {share.tolist()} have to be numbers, 0 or larger, and not all 0"
+        )
+    for name, values in zip(WEIBULL_COLUMNS, (scale_mps, shape), strict=True):
+        if values is not None and not (np.isfinite(values).all() and (values > 0).all()):
+            raise InputError(f"wind rose {path}: {name} {values.tolist()} has to be a number above 0 everywhere")
+
+
+def prevailing_deg(site: Site, wanted: SectorSet) -> float:
+    """Where the wanted wind mostly comes from.
+
+    Parameters
+    ----------
+    site
+        With its wind rose; without one the wind is uniform.
+    wanted
+        The directions that count.
+
+    Returns
+    -------
+    float
+        Mean direction, weighted by frequency [deg]; NaN where the wind comes from everywhere alike, or from
+        nowhere.
+    """
+    middles = np.arange(0.5, FULL_CIRCLE_DEG)
+    cells = [SectorSet.of([Sector(float(middle) - 0.5, 1.0)]).intersection(wanted) for middle in middles]
+    weights = np.array([share_within(site, cell) for cell in cells])
+    resultant = np.sum(weights * np.exp(1j * np.deg2rad(middles)))
+    if abs(resultant) <= UNIFORM_RESULTANT * np.sum(weights):
+        return float("nan")
+    return float(circular_mean_deg(middles, weights))

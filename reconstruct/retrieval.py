@@ -1,0 +1,386 @@
+"""The one least-squares core: radial speeds to wind, for every technique, one scan or a million at once.
+
+A ray sees v_r = b · (u, v, w) with b = (sin θ cos φ, cos θ cos φ, sin φ). Sector scan, dual and triple
+Doppler and the two-beam lidar are weighted linear least squares of v_r on the rows b, and differ in their
+rows alone.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from threading import local
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from geometry.arrays import ArrayLike, FloatArray, IntArray
+from geometry.errors import InputError
+from reconstruct.factor import Factor, dot, factorise, take_out, turn
+
+REASONS = (
+    "solved",
+    "no ray is left",
+    "fewer rays than unknowns",
+    "the rays cannot tell the components of the wind apart",
+)
+"""What `Retrieval.status` means."""
+
+CHUNK = 2**17
+"""Radial speeds that are worked on at once: a megabyte."""
+
+MEMORY = 6 * CHUNK
+"""Numbers that a thread keeps to work in: speeds, weights, scratch and three columns of a block."""
+
+_THREAD = local()
+
+Block = tuple[int | slice, ...]
+"""Index of a part of an array."""
+
+
+@dataclass(frozen=True)
+class Retrieval:
+    """Wind of one or many scans, with what the fit knows about its own quality."""
+
+    wind_mps: FloatArray  # (..., col) u, v or u, v, w; NaN where it cannot be known
+    condition: FloatArray  # (...,) of the weighted rows; inf where the rank is short
+    residual_std_mps: FloatArray  # (...,) of a ray of weight one; NaN without a ray to spare
+    cofactor: FloatArray  # (..., col, col) covariance of the wind when a ray of weight one has variance one
+    rays: IntArray  # (...,) rays that took part
+    status: IntArray  # (...,) index into REASONS
+
+    @property
+    def covariance_m2s2(self) -> FloatArray:
+        """(..., col, col) covariance of the wind as the residuals suggest it [m²/s²]."""
+        return np.asarray(np.square(self.residual_std_mps)[..., None, None] * self.cofactor)
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """How many scans gave no wind, by reason."""
+        counts = np.bincount(self.status.ravel(), minlength=len(REASONS))
+        return {REASONS[i]: int(counts[i]) for i in range(1, len(REASONS)) if counts[i]}
+
+
+def rows(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, *, columns: Literal[2, 3] = 2) -> FloatArray:
+    """Rows of the least-squares problem: the first components of each beam's unit vector.
+
+    Parameters
+    ----------
+    azimuth_deg, elevation_deg : array_like
+        (..., ray) beam directions [degrees], clockwise from true north and above the horizontal.
+    columns : {2, 3}
+        2 fits u and v and leaves a vertical wind in them, about w tan φ along the axis; 3 fits w too.
+
+    Returns
+    -------
+    numpy.ndarray
+        (..., ray, col) b = (sin θ cos φ, cos θ cos φ, sin φ).
+
+    Raises
+    ------
+    InputError
+        If the number of columns is neither 2 nor 3.
+
+    Examples
+    --------
+    >>> rows([90.0, 0.0], [0.0, 60.0], columns=3).round(3) + 0.0
+    array([[1.   , 0.   , 0.   ],
+           [0.   , 0.5  , 0.866]])
+    """
+    if columns not in (2, 3):
+        raise InputError(f"a fit has 2 columns (u, v) or 3 (u, v, w), not {columns}")
+    azimuth, elevation = np.broadcast_arrays(np.radians(azimuth_deg), np.radians(elevation_deg))
+    cosine = np.cos(elevation)
+    parts = (np.sin(azimuth) * cosine, np.cos(azimuth) * cosine, np.sin(elevation))
+    return np.stack(parts[:columns], axis=-1)
+
+
+def solve(rows: ArrayLike, radial_speed_mps: ArrayLike, *, weights: ArrayLike | None = None) -> Retrieval:
+    """Wind that fits the radial speeds of each scan best.
+
+    Complete scans of one geometry (rows without leading axes) share one matrix product; a scan that misses
+    rays is factorised on its own.
+
+    Parameters
+    ----------
+    rows : array_like
+        (ray, col), or (..., ray, col) where every scan has its own; from `rows`. NaN: the ray is missing.
+    radial_speed_mps : array_like
+        (..., ray) positive away from the lidar [m/s]; not finite: the ray is missing.
+    weights : array_like, optional
+        (ray,) or (..., ray), not negative: 1 over the variance of each ray up to a factor; 0 leaves the ray
+        out.
+
+    Returns
+    -------
+    Retrieval
+        NaN, with the reason in `status`, where the rays left over cannot tell the components apart.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not belong together or a weight is negative.
+
+    Examples
+    --------
+    >>> azimuth = np.array([75.0, 90.0, 105.0])
+    >>> fit = solve(rows(azimuth, 0.0), [8.6603, 7.0711, 5.0])
+    >>> fit.wind_mps.round(3)
+    array([7.071, 7.071])
+    >>> solve(rows(azimuth, 0.0), [8.6603, np.nan, np.nan]).lost
+    {'fewer rays than unknowns': 1}
+    """
+    matrix, speed, root, lead = _checked(rows, radial_speed_mps, weights)
+    count, columns = matrix.shape[-2:]
+    shared = _turned(matrix, root) if matrix.ndim == 2 and root.ndim == 1 else None
+    product = _shared_product(shared) if shared else None
+    speed = np.broadcast_to(speed, (*lead, count))
+    matrix, root = np.broadcast_to(matrix, (*lead, count, columns)), np.broadcast_to(root, (*lead, count))
+    out = _empty(lead, columns)
+    for index in blocks(lead, CHUNK // max(count, 1)):
+        part = speed[index].reshape(-1, count)
+        if product:
+            fitted = _fit_shared(product, part)
+        else:
+            own = _turned(matrix[index].reshape(-1, count, columns), root[index].reshape(-1, count))
+            fitted = _fit(own, part)
+        for name, values in vars(fitted).items():
+            target = getattr(out, name)
+            target[index] = values.reshape(target[index].shape)
+    return out
+
+
+def gain(rows: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:
+    """Matrix G of the fit: wind = G v_r.
+
+    Parameters
+    ----------
+    rows : array_like
+        (..., ray, col) from `rows`; a row with NaN takes no part.
+    weights : array_like, optional
+        (..., ray) not negative.
+
+    Returns
+    -------
+    numpy.ndarray
+        (..., col, ray); NaN where the rank is short.
+
+    Examples
+    --------
+    >>> gain(rows([0.0, 90.0], 0.0)).round(3) + 0.0
+    array([[0., 1.],
+           [1., 0.]])
+    """
+    factor, root = _factor_of(rows, weights)
+    weighted = np.stack([unit * root for unit in factor.basis])
+    return np.asarray(np.einsum("ik...,kr...->...ir", factor.spread, weighted))
+
+
+def condition(rows: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:
+    """Condition number (...,) of the weighted rows (..., ray, col): how much the worst relative error may
+    grow.
+
+    Examples
+    --------
+    >>> round(float(condition(rows(np.arange(-5.0, 5.5), 0.0))), 3)
+    18.107
+    """
+    factor, _ = _factor_of(rows, weights)
+    return factor.condition
+
+
+def cofactor(rows: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:
+    """Covariance (..., col, col) of the fitted wind when a ray of weight one has variance one; NaN if the
+    rank is short.
+    """
+    factor, _ = _factor_of(rows, weights)
+    return _outer(factor.spread)
+
+
+class _Turned(NamedTuple):
+    """Rows of one geometry or of many scans, turned to the axis of their beams, missing rays set to zero."""
+
+    columns: list[FloatArray]  # each (ray, ...)
+    root: FloatArray  # (ray, ...) square root of the weights
+    axis: FloatArray  # (2, ...) sine and cosine of its azimuth
+
+
+class _Shared(NamedTuple):
+    """What the complete scans of one geometry have in common."""
+
+    rows: _Turned  # (ray, 1): one geometry, to be set against many scans
+    basis: FloatArray  # (ray, col)
+    spread: FloatArray  # (col, col)
+    condition: float
+    short: bool
+
+
+def _turned(matrix: FloatArray, root: FloatArray) -> _Turned:
+    known = np.all(np.isfinite(matrix), axis=-1)
+    root = np.moveaxis(np.where(known, root, 0.0), -1, 0)
+    matrix = np.ascontiguousarray(np.moveaxis(np.where(known[..., None], matrix, 0.0), (-1, -2), (0, 1)))
+    columns, axis = turn(list(matrix), root)
+    return _Turned(columns, root, axis)
+
+
+def _factor_of(rows: ArrayLike, weights: ArrayLike | None) -> tuple[Factor, FloatArray]:
+    matrix = np.asarray(rows, dtype=float)
+    matrix, _, root, lead = _checked(matrix, np.zeros(matrix.shape[:-1]), weights)
+    turned = _turned(
+        np.broadcast_to(matrix, lead + matrix.shape[-2:]), np.broadcast_to(root, lead + root.shape[-1:])
+    )
+    return factorise(*turned), turned.root
+
+
+def _outer(spread: FloatArray) -> FloatArray:
+    """(..., col, col) spread spreadᵀ of (col, col, ...)."""
+    return np.asarray(np.einsum("ik...,jk...->...ij", spread, spread))
+
+
+def _shared_product(rows: _Turned) -> _Shared:
+    factor = factorise(*rows)
+    wide = _Turned([column[:, None] for column in rows.columns], rows.root[:, None], rows.axis)
+    return _Shared(
+        wide, np.stack(factor.basis, -1), factor.spread, float(factor.condition), bool(factor.short)
+    )
+
+
+def _fit_shared(shared: _Shared, speed: FloatArray) -> Retrieval:
+    """Scans (scan, ray) of one geometry: complete ones through one matrix product, the others on their
+    own.
+    """
+    with np.errstate(invalid="ignore"):
+        complete = np.isfinite(np.einsum("nr->n", speed)) & (not shared.short)
+    if np.all(complete):
+        return _fit_complete(shared, speed)
+    out = _fit(shared.rows, speed)
+    if np.any(complete):  # the same fit to rounding; through the product so that equal scans give equal winds
+        part = _fit_complete(shared, speed[complete])
+        for name, values in vars(part).items():
+            getattr(out, name)[complete] = values
+    return out
+
+
+def _fit_complete(shared: _Shared, speed: FloatArray) -> Retrieval:
+    root = shared.rows.root[:, 0]
+    scans, columns = len(speed), len(shared.spread)
+    weighted = speed if np.all(root == 1) else speed * root
+    parts = weighted @ shared.basis
+    rest = parts @ shared.basis.T
+    np.subtract(weighted, rest, out=rest)
+    rays = np.full(scans, np.count_nonzero(root))
+    return Retrieval(
+        wind_mps=parts @ shared.spread.T,
+        condition=np.full(scans, shared.condition),
+        residual_std_mps=_residual_std(np.einsum("nr,nr->n", rest, rest), rays, columns),
+        cofactor=np.tile(_outer(shared.spread), (scans, 1, 1)),
+        rays=rays,
+        status=np.zeros(scans, dtype=np.intp),
+    )
+
+
+def _fit(rows: _Turned, speed: FloatArray) -> Retrieval:
+    """Scans (scan, ray), each with its own missing rays."""
+    memory = _memory((len(rows.columns) + 3, *speed.T.shape))
+    rest, root, scratch = memory[:3]
+    rest[...] = speed.T
+    known = np.isfinite(rest)
+    np.copyto(rest, 0.0, where=~known)
+    np.multiply(rows.root, known, out=root)
+    factor = factorise(rows.columns, root, rows.axis, memory[2:])
+    rest *= root
+    parts = take_out(factor.basis, rest, scratch)
+    rays = np.count_nonzero(root, axis=0)
+    status = np.select([rays == 0, rays < len(rows.columns), factor.short], [1, 2, 3], 0)
+    lost = status > 0
+    out = Retrieval(
+        wind_mps=np.einsum("ik...,k...->...i", factor.spread, parts),
+        condition=np.where(lost, np.inf, factor.condition),
+        residual_std_mps=_residual_std(dot(rest, rest), rays, len(rows.columns)),
+        cofactor=_outer(factor.spread),
+        rays=rays,
+        status=status,
+    )
+    out.condition[rays == 0] = np.nan
+    for values in (out.wind_mps, out.residual_std_mps, out.cofactor):
+        values[lost] = np.nan
+    return out
+
+
+def _memory(shape: tuple[int, ...]) -> FloatArray:
+    """Memory of this thread to work in, used again for the next block: new pages cost more than the
+    arithmetic.
+    """
+    size = int(np.prod(shape))
+    if size > MEMORY:
+        return np.empty(shape)
+    if not hasattr(_THREAD, "memory"):
+        _THREAD.memory = np.empty(MEMORY)
+    kept: FloatArray = _THREAD.memory
+    return kept[:size].reshape(shape)
+
+
+def _residual_std(squares: FloatArray, rays: IntArray, columns: int) -> FloatArray:
+    """Root of the weighted sum of squares over the rays to spare; NaN where there is none."""
+    spare = np.where(rays > columns, rays - columns, np.nan)
+    return np.asarray(np.sqrt(squares / spare))
+
+
+def _empty(lead: tuple[int, ...], columns: int) -> Retrieval:
+    return Retrieval(
+        wind_mps=np.empty((*lead, columns)),
+        condition=np.empty(lead),
+        residual_std_mps=np.empty(lead),
+        cofactor=np.empty((*lead, columns, columns)),
+        rays=np.empty(lead, dtype=np.intp),
+        status=np.empty(lead, dtype=np.intp),
+    )
+
+
+def blocks(shape: tuple[int, ...], size: int) -> Iterator[Block]:
+    """Indices of blocks of an array of that shape, each of about that many elements and contiguous in order.
+
+    Examples
+    --------
+    >>> list(blocks((2, 5), 3))
+    [(0, slice(0, 3, None)), (0, slice(3, 6, None)), (1, slice(0, 3, None)), (1, slice(3, 6, None))]
+    """
+    if not shape:
+        yield ()
+        return
+    axis, inner = 0, int(np.prod(shape[1:]))
+    while axis < len(shape) - 1 and inner > size:
+        axis += 1
+        inner //= max(shape[axis], 1)
+    step = max(1, size // max(inner, 1))
+    for outer in np.ndindex(shape[:axis]):
+        for start in range(0, shape[axis], step):
+            yield (*outer, slice(start, start + step))
+
+
+def _checked(
+    rows: ArrayLike, radial_speed_mps: ArrayLike, weights: ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[int, ...]]:
+    """Rows, speeds, root weights and the shape of the scans, or one clear error."""
+    matrix = np.asarray(rows, dtype=float)
+    speed = np.asarray(radial_speed_mps, dtype=float)
+    if matrix.ndim < 2 or matrix.shape[-1] not in (2, 3):
+        raise InputError(
+            f"rows have the shape {matrix.shape}: (..., ray, 2) or (..., ray, 3) is needed, see rows()"
+        )
+    weight = np.ones(matrix.shape[-2]) if weights is None else np.asarray(weights, dtype=float)
+    if speed.ndim < 1 or weight.ndim < 1 or {speed.shape[-1], weight.shape[-1]} != {matrix.shape[-2]}:
+        raise InputError(
+            f"rows {matrix.shape}, radial speeds {speed.shape} and weights {weight.shape} do not belong "
+            "together: the last axis of speeds and weights and the last but one of the rows are the rays"
+        )
+    if not np.all(np.isfinite(weight) & (weight >= 0)):
+        raise InputError(
+            "a weight is negative or not finite: weights are 1 over the variance, 0 leaves a ray out"
+        )
+    try:
+        lead = np.broadcast_shapes(matrix.shape[:-2], speed.shape[:-1], weight.shape[:-1])
+    except ValueError:
+        raise InputError(
+            f"the scans of rows {matrix.shape}, radial speeds {speed.shape} and weights {weight.shape} "
+            "differ in number"
+        ) from None
+    return matrix, speed, np.sqrt(weight), lead

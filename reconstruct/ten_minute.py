@@ -1,0 +1,259 @@
+"""The ten-minute mean of a scan against an instrument at the target: bias, scatter and how the two hang
+together.
+
+Everything random is Gaussian in the wind *vector*: turbulence seen by the rays, turbulence at the target,
+noise. The means compared are of *speeds*, so that each covariance goes through `reconstruct.joint`.
+Stationarity leaves a sum over the lags between scans instead of one over all pairs.
+
+Three kinds of error of a ray are told apart: turbulence hangs together from scan to scan and with the target;
+random errors (noise, pointing jitter) are drawn anew for every ray; persistent errors (heading, levelling,
+calibration) are drawn once for the whole campaign.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from geometry.arrays import ArrayLike, FloatArray
+from geometry.errors import InputError
+from reconstruct.covariance import wind_frame
+from reconstruct.joint import expand, speed_covariance
+from reconstruct.moments import WindMoments, wind_moments
+from reconstruct.rays import Rays
+from reconstruct.retrieval import gain, rows
+from reconstruct.scan_means import Period, PointMean, ScanMean, point_mean, scan_mean, scan_with_target
+from reconstruct.spectra import Turbulence
+from reconstruct.wind import WindState
+
+Reference = Literal["scalar", "vector"]
+
+AVERAGING_S = 600.0
+
+
+class TenMinute(NamedTuple):
+    """Ten-minute means of lidar and reference, over many such periods of one state of the wind; (...) is the
+    size axis.
+
+    Speeds are scalar means of the scans' speeds, as the reference study took them; directions those of vector
+    means.
+    """
+
+    scans: float  # scans that take part in one mean
+    lidar_mean_mps: FloatArray  # (...) expected mean speed
+    reference_mean_mps: FloatArray  # (...) same for all sizes
+    lidar_variance_m2s2: FloatArray  # (...) of the ten-minute means
+    reference_variance_m2s2: FloatArray  # (...)
+    covariance_m2s2: FloatArray  # (...) of the two means
+    vector_covariance_m2s2: FloatArray  # (..., 2, 2) of lidar minus reference, mean vectors east and north
+    mean_error_mps: FloatArray  # (..., 2) of the mean vector, east and north
+    reference_direction_std_deg: float  # of the ten-minute mean at the target
+    direction_covariance_deg2: FloatArray  # (...) of the directions of lidar and reference, to first order
+    moments: WindMoments  # of the lidar's mean vector against the reference's
+
+    @property
+    def speed_bias_mps(self) -> FloatArray:
+        """Lidar minus reference, expected [m/s]."""
+        return self.lidar_mean_mps - self.reference_mean_mps
+
+    @property
+    def speed_std_mps(self) -> FloatArray:
+        """Standard deviation of lidar minus reference [m/s]."""
+        return self.scatter_std_mps(1.0)
+
+    @property
+    def direction_bias_deg(self) -> FloatArray:
+        """Lidar minus reference, expected [degrees]."""
+        return self.moments.direction_bias_deg
+
+    @property
+    def direction_std_deg(self) -> FloatArray:
+        """Standard deviation of lidar minus reference [degrees]."""
+        return self.moments.direction_std_deg
+
+    def scatter_std_mps(self, slope: float) -> FloatArray:
+        """Standard deviation of reference - slope · lidar [m/s]."""
+        square = (
+            self.reference_variance_m2s2
+            - 2 * slope * self.covariance_m2s2
+            + slope**2 * self.lidar_variance_m2s2
+        )
+        return np.asarray(np.sqrt(np.clip(square, 0.0, None)))
+
+
+def predict_ten_minute(
+    rays: Rays,
+    wind: WindState,
+    turbulence: Turbulence,
+    *,
+    gains: FloatArray | None = None,
+    random_m2s2: ArrayLike = 0.0,
+    persistent_m2s2: ArrayLike = 0.0,
+    mean_error_mps: ArrayLike = (0.0, 0.0),
+    reference: Reference = "scalar",
+    averaging_s: float = AVERAGING_S,
+    scan_share: float = 1.0,
+    sweep: bool = True,
+) -> TenMinute:
+    """Predict the mean over ten minutes of a scan, or of several cut from it, against a point at the target.
+
+    Parameters
+    ----------
+    rays
+        Rays of one scan.
+    wind
+        Mean wind at the target.
+    turbulence
+        Model, intensity and length.
+    gains
+        (..., 2, ray) matrices that take radial speeds to east and north wind: one for each sector cut from
+        the scan, zero for rays left out (see `subset_gains`). Without it the whole scan.
+    random_m2s2
+        (ray, ray) covariance of the errors drawn anew for every scan [m²/s²]; a number stands for white
+        noise.
+    persistent_m2s2
+        (ray, ray) covariance of the errors that all scans share [m²/s²].
+    mean_error_mps
+        (..., 2) mean error of the retrieved wind, east and north [m/s]: vertical wind, shear, gradients.
+    reference
+        "scalar": mean of the speeds at the target, a cup; "vector": speed of the mean vector, as of a sonic.
+    averaging_s
+        Averaging time [s].
+    scan_share
+        Share of the scans that are valid, above 0 to 1, lost at random.
+    sweep
+        Average over the head's turn and the air's way during each ray.
+
+    Returns
+    -------
+    TenMinute
+        With the leading axes of `gains`; NaN where a gain is NaN.
+
+    Raises
+    ------
+    InputError
+        If no scan fits into the averaging time, or the share is not above 0 and up to 1.
+
+    Examples
+    --------
+    >>> from geometry.gates import Probe
+    >>> azimuth = np.arange(-29.0, 30.0, 2.0)
+    >>> scan = Rays(azimuth_deg=azimuth, elevation_deg=np.zeros(30), range_m=np.full(30, 1000.0),
+    ...     head_m=np.tile([0.0, -1000.0, 0.0], (30, 1)), lidar=np.zeros(30, dtype=int),
+    ...     time_s=0.4 * np.arange(30) + 0.2,
+    ...     duration_s=np.full(30, 0.4), swept_azimuth_deg=np.full(30, 2.0), probes=(Probe(pulse_ns=200,
+    ...     window_ns=256),),
+    ...     period_s=12.0, back_and_forth=True)
+    >>> mean = predict_ten_minute(scan, WindState(8.0, 180.0), Turbulence(0.09, 170.0), random_m2s2=0.01)
+    >>> mean.scans, round(float(mean.speed_std_mps), 2)
+    (50.0, 0.14)
+    """
+    period = _checked(Period(rays, wind, turbulence, averaging_s, scan_share, sweep))
+    turn = wind_frame(wind.from_deg)[:2, :2]
+    matrix, known = _fits(rays, gains, turn)
+    offset = np.asarray(mean_error_mps, dtype=float)
+    random, persistent = (_ray_matrix(value, rays.count) for value in (random_m2s2, persistent_m2s2))
+    lidar = scan_mean(period, matrix, np.array([wind.speed_mps, 0.0]) + offset @ turn.T, random, persistent)
+    point = point_mean(period)
+    cross, weight = scan_with_target(period, matrix)
+    against = _against_cup if reference == "scalar" else _against_sonic
+    mean, variance, covariance = against(period, lidar, point, cross, weight)
+    lost = np.where(known, 0.0, np.nan)
+    vectors = _Vectors.of(lidar, point, np.einsum("pt,...ptij->...ij", weight, cross), turn, lost)
+    degrees = np.degrees(1.0) / wind.speed_mps if wind.speed_mps > 0 else np.nan
+    return TenMinute(
+        scans=scan_share * period.scans,
+        lidar_mean_mps=lidar.mean_mps + lost,
+        reference_mean_mps=np.broadcast_to(mean, known.shape),
+        lidar_variance_m2s2=lidar.variance_m2s2 + lost,
+        reference_variance_m2s2=np.broadcast_to(variance, known.shape),
+        covariance_m2s2=covariance + lost,
+        vector_covariance_m2s2=vectors.difference_m2s2,
+        mean_error_mps=np.broadcast_to(offset, (*known.shape, 2)),
+        reference_direction_std_deg=float(degrees * np.sqrt(point.vector_variance_m2s2[1])),
+        direction_covariance_deg2=degrees**2 * vectors.across_m2s2,
+        moments=wind_moments(wind.uv_mps, vectors.difference_m2s2, mean_error_mps=offset),
+    )
+
+
+def subset_gains(rays: Rays, kept: list[slice]) -> FloatArray:
+    """Matrices (size, 2, ray) of fits that use some of a scan's rays, zero for the others.
+
+    Examples
+    --------
+    >>> from geometry.gates import Probe
+    >>> scan = Rays(azimuth_deg=np.array([0.0, 45.0, 90.0]), elevation_deg=np.zeros(3), range_m=np.full(3,
+    ...     1000.0),
+    ...     head_m=np.zeros((3, 3)), lidar=np.zeros(3, dtype=int), time_s=np.arange(3.0),
+    ...     duration_s=np.ones(3),
+    ...     swept_azimuth_deg=np.zeros(3), probes=(Probe(pulse_ns=200, window_ns=256),), period_s=3.0)
+    >>> subset_gains(scan, [slice(0, 3), slice(0, 2)])[1].round(3) + 0.0
+    array([[-1.   ,  1.414,  0.   ],
+           [ 1.   ,  0.   ,  0.   ]])
+    """
+    matrix = rows(rays.azimuth_deg, rays.elevation_deg)
+    out = np.zeros((len(kept), 2, rays.count))
+    for index, part in enumerate(kept):
+        out[index, :, part] = gain(matrix[part])
+    return out
+
+
+class _Vectors(NamedTuple):
+    """Mean vectors of lidar and target."""
+
+    difference_m2s2: FloatArray  # (..., 2, 2) covariance of lidar minus target, east and north
+    across_m2s2: FloatArray  # (...) covariance of the two components across the wind
+
+    @classmethod
+    def of(
+        cls, lidar: ScanMean, point: PointMean, cross: FloatArray, turn: FloatArray, lost: FloatArray
+    ) -> "_Vectors":
+        both = cross + np.swapaxes(cross, -1, -2)
+        difference = lidar.vector_covariance_m2s2 - both + np.diag(point.vector_variance_m2s2)
+        return cls(turn.T @ difference @ turn + lost[..., None, None], cross[..., 1, 1] + lost)
+
+
+def _checked(period: Period) -> Period:
+    if not 0 < period.scan_share <= 1:
+        raise InputError(f"a share of {period.scan_share} valid scans came; allowed is above 0, up to 1")
+    if period.scans < 1:
+        raise InputError(
+            f"a scan of {period.rays.period_s} s does not fit into {period.averaging_s} s: "
+            "shorten the scan or average longer"
+        )
+    return period
+
+
+def _fits(rays: Rays, gains: FloatArray | None, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fits (..., 1, 2, ray) to downwind and left, 0 where they are not known, and where they are."""
+    east_north = gain(rows(rays.azimuth_deg, rays.elevation_deg)) if gains is None else gains
+    matrix = (turn @ east_north)[..., None, :, :]
+    known = np.all(np.isfinite(matrix), axis=(-3, -2, -1))
+    return np.where(known[..., None, None, None], matrix, 0.0), known
+
+
+def _ray_matrix(value: ArrayLike, count: int) -> FloatArray:
+    given = np.asarray(value, dtype=float)
+    return given * np.eye(count) if given.ndim == 0 else given
+
+
+Moments = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def _against_cup(
+    period: Period, lidar: ScanMean, point: PointMean, cross: FloatArray, weight: FloatArray
+) -> Moments:
+    """Mean and variance of the mean of the speeds at the target, and its covariance with the lidar's."""
+    del period  # the speed at one moment is expanded already
+    values = speed_covariance(lidar.lidar.at((..., slice(None), None)), point.speed, cross)
+    return point.mean_mps, point.variance_m2s2, np.einsum("pt,...pt->...", weight, values)
+
+
+def _against_sonic(
+    period: Period, lidar: ScanMean, point: PointMean, cross: FloatArray, weight: FloatArray
+) -> Moments:
+    """Mean and variance of the speed of the target's mean vector, and its covariance with the lidar."""
+    averaged = expand(np.array([period.wind.speed_mps, 0.0]), np.diag(point.vector_variance_m2s2))
+    share = period.pass_share
+    each = np.einsum("pt,...ptij->...pij", weight / np.where(share > 0, share, 1.0)[:, None], cross)
+    values = speed_covariance(lidar.lidar, averaged, each)
+    return averaged.mean_mps, averaged.variance_m2s2, np.einsum("p,...p->...", share, values)
