@@ -218,7 +218,7 @@ class Sector:
         Returns
         -------
         BoolArray
-            True inside, same shape; NaN is in no sector.
+            True inside and up to `MERGE_TOLERANCE_DEG` beside it, same shape; NaN is in no sector.
 
         Examples
         --------
@@ -226,7 +226,9 @@ class Sector:
         [False, True, True]
         """
         turn = wrap_360_deg(np.asarray(angle_deg, dtype=np.float64) - self.from_deg)
-        return np.asarray(turn <= self.width_deg)
+        # 218.4 - 118.3 is not 100.1 in floating point, and yet the end of a sector is in it
+        after = turn <= self.width_deg + MERGE_TOLERANCE_DEG
+        return np.asarray(after | (turn >= FULL_CIRCLE_DEG - MERGE_TOLERANCE_DEG))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,10 @@ from geometry.errors import InputError
 #: share their whole length up to an angle of 30 degrees and half of it at 90.
 SHARED_SEPARATION = 0.25
 
+#: Sine of the angle up to which two beams count as parallel, and a beam as vertical: two directions made from
+#: opposite azimuths in degrees are 1.1e-15 off by rounding alone. At 1e-9 degrees the sine is 1.7e-11.
+PARALLEL_SINE = 2e-15
+
 #: Dekker's constant 2^27 + 1, which splits a float64 into two halves whose products are exact.
 _SPLITTER = 134_217_729.0
 
@@ -19,7 +23,8 @@ _SPLITTER = 134_217_729.0
 class Crossing(NamedTuple):
     """Closest approach of two beams, all arrays of the shape (...) that the inputs broadcast to.
 
-    For parallel beams the points are infinitely far away: points, ranges and height difference are NaN.
+    For parallel beams (`PARALLEL_SINE`) the points are infinitely far away, or anywhere: points, ranges and
+    height difference are NaN.
     """
 
     point1_m: FloatArray  # (..., 3) on the first beam, nearest to the second
@@ -31,7 +36,7 @@ class Crossing(NamedTuple):
         FloatArray  # point 2 minus point 1, upwards; all of the gap where both beams are level
     )
     angle_deg: FloatArray  # between the two directions in three dimensions, 0 to 180
-    opening_angle_deg: FloatArray  # the same in plan, 0 to 180; NaN where a beam is exactly vertical
+    opening_angle_deg: FloatArray  # the same in plan, 0 to 180; NaN where a beam is vertical
     folded_angle_deg: FloatArray  # in plan, between the two lines, 0 to 90: the conditioning of the pair
 
 
@@ -81,7 +86,7 @@ def cross(
     between = origin2 - origin1
     normal = _cross_product(beam1, beam2)
     square = _dot(normal, normal)
-    parallel = square == 0.0
+    parallel = square <= PARALLEL_SINE**2 * _dot(beam1, beam1) * _dot(beam2, beam2)
     safe = np.where(parallel, np.nan, square)
     along1 = _dot(between, np.cross(beam2, normal)) / safe
     along2 = _dot(between, np.cross(beam1, normal)) / safe
@@ -186,9 +191,12 @@ def _checked(*vectors: ArrayLike) -> list[FloatArray]:
 
 
 def _plan_products(beam1: FloatArray, beam2: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """|Cross| and dot product of the two beams in plan; NaN where a beam is exactly vertical."""
+    """|Cross| and dot product of the two beams in plan; NaN where a beam is vertical."""
     east1, north1, east2, north2 = beam1[..., 0], beam1[..., 1], beam2[..., 0], beam2[..., 1]
-    vertical = ((east1 == 0.0) & (north1 == 0.0)) | ((east2 == 0.0) & (north2 == 0.0))
+    # cos 90° is 6e-17 in floating point: what is left in plan of a beam straight up points nowhere
+    vertical = (np.hypot(east1, north1) <= PARALLEL_SINE * np.abs(beam1[..., 2])) | (
+        np.hypot(east2, north2) <= PARALLEL_SINE * np.abs(beam2[..., 2])
+    )
     sine = np.abs(_difference_of_products(east1, north2, north1, east2))
     return np.where(vertical, np.nan, sine), east1 * east2 + north1 * north2
 

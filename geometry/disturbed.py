@@ -89,7 +89,7 @@ def jensen_excluded(
     return [
         directions_touching(
             volume_m,
-            partial(_touch_jensen, hub, float(size), decay, max_diameters * float(size)),
+            partial(touch_jensen, hub, float(size), decay, max_diameters * float(size)),
             tolerance_deg=tolerance_deg,
         )
         for hub, size in zip(rotors.hub_m, rotors.diameter_m, strict=True)
@@ -131,7 +131,7 @@ def iec_excluded(
     """
     return [
         directions_touching(
-            volume_m, partial(_touch_iec, hub, float(size), max_diameters), tolerance_deg=tolerance_deg
+            volume_m, partial(touch_iec, hub, float(size), max_diameters), tolerance_deg=tolerance_deg
         )
         for hub, size in zip(rotors.hub_m, rotors.diameter_m, strict=True)
     ]
@@ -149,7 +149,7 @@ def any_of(sets: Iterable[SectorSet]) -> SectorSet:
     return SectorSet.of(sector for each in sets for sector in each.sectors)
 
 
-def _touch_jensen(
+def touch_jensen(
     hub_m: FloatArray,
     diameter_m: float,
     decay: float,
@@ -181,7 +181,7 @@ def _half_angle_deg(downwind_m: FloatArray, distance_m: FloatArray) -> FloatArra
     return np.asarray(np.rad2deg(np.arctan2(across, downwind)))
 
 
-def _touch_iec(
+def touch_iec(
     hub_m: FloatArray, diameter_m: float, max_diameters: float, points_m: FloatArray, margin_m: FloatArray
 ) -> Touch:
     """Disturbed sectors of balls around points (n, 3): width at the nearest point plus the ball's angle."""

@@ -24,6 +24,9 @@ COMMANDS = (
     "view",
     "report",
     "tradeoff",
+    "simulate",
+    "retrieve",
+    "tour",
 )  # modules of planner.commands, in the order of the help
 
 BAD_INPUT = 2

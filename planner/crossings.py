@@ -72,7 +72,7 @@ def cross_scans(places: Places, pair: Pair, first: ScanLayout, second: ScanLayou
     pair
         Names the target.
     first, second
-        Two of its scans; of a scan with several rays the axis counts, of a list of points the target's own ray.
+        Two of its scans; of a scan with several rays the axis counts, of a list of points the target's own.
 
     Returns
     -------

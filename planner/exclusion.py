@@ -1,4 +1,4 @@
-"""Which wind directions are free of wakes, for each scan and the volume it measures; how much of the wind is lost."""
+"""Which wind directions are free of wakes, for what each scan measures, and how much of the wind is lost."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ DEFICIT_STEP_DEG = 1.0
 
 
 class Near(NamedTuple):
-    """How far something that makes wakes stands from what a scan measures, in its own (equivalent) diameters."""
+    """How far something with a wake stands from what a scan measures, in its own (equivalent) diameters."""
 
     name: str
     is_rotor: bool
@@ -30,7 +30,7 @@ class Near(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exclusion:
-    """What wakes take from one scan at one target; directions are where the wind comes from, from true north."""
+    """What wakes take from one scan at one target; directions are where the wind comes from, true."""
 
     lidar: str
     scan: str
@@ -125,7 +125,13 @@ def exclude(places: Places, layout: ScanLayout, target: str) -> Exclusion:
 
 
 def wanted_directions(site: Site) -> SectorSet:
-    """The wind directions that count: those declared, else all."""
+    """The wind directions that count: those declared, else all.
+
+    Examples
+    --------
+    >>> wanted_directions(Site(name="Moor", crs="EPSG:32632")).pairs()
+    [(0.0, 360.0)]
+    """
     declared = None if site.wind is None else site.wind.directions_deg
     if declared is None:
         return SectorSet.full()
@@ -133,7 +139,7 @@ def wanted_directions(site: Site) -> SectorSet:
 
 
 def near_wakes(places: Places, layout: ScanLayout, target: str) -> tuple[Near, ...]:
-    """Each turbine's and obstacle's horizontal distance from what a scan measures at a target, and from it."""
+    """Horizontal distance of each turbine and obstacle from what a scan measures at a target, and from it."""
     site = places.site
     names = [(turbine.name, True) for turbine in site.turbines]
     names += [(obstacle.name, False) for obstacle in site.obstacles]
@@ -151,14 +157,14 @@ def _lost_share(site: Site, wanted: SectorSet, excluded: SectorSet) -> float:
     all_of_it = share_within(site, wanted)
     if all_of_it == 0.0:
         raise InputError(
-            f"the wind rose has no wind from the wanted directions {wanted.pairs()}; give wind.directions_deg "
-            "from which the wind blows"
+            f"the wind rose has no wind from the wanted directions {wanted.pairs()}; give "
+            "wind.directions_deg from which the wind blows"
         )
     return share_within(site, wanted.intersection(excluded)) / all_of_it
 
 
 def _disturbing(places: Places, volume: FloatArray) -> tuple[tuple[str, str, SectorSet], ...]:
-    """Directions disturbed by each turbine (and, in IEC's model, each obstacle), as (name, model, directions)."""
+    """Directions that each turbine (in IEC's model also each obstacle) disturbs: name, model, directions."""
     wakes = places.site.wakes
     turbines = [turbine.name for turbine in places.site.turbines]
     found: list[tuple[str, str, SectorSet]] = []

@@ -14,7 +14,7 @@ from geometry.frames import EarthModel, model_error_m
 from geometry.gates import Probe
 from planner.places import Places
 from planner.site import Site
-from reconstruct.prediction import predict_linear, predict_noise
+from reconstruct.prediction import predict_linear
 from reconstruct.rays import Rays
 from reconstruct.retrieval import gain, rows
 from reconstruct.spectra import Turbulence
@@ -31,7 +31,7 @@ class Effect:
 
     name: str
     size: float | None  # in this scene, at the worst target; None where the site does not say enough
-    unit: str  # m or m/s
+    unit: str  # m, m/s or deg
     tolerance: float
     modelled: bool
     text: str  # what it is and why it is in or out
@@ -98,7 +98,7 @@ def earth_model(places: Places, effects: Sequence[Effect]) -> EarthModel:
 
 
 def wind_effects(site: Site, airs: Sequence[Air]) -> tuple[Effect, ...]:
-    """Size of each effect on one scan's wind, in m/s: the worst over the retrievals and states given."""
+    """Size of each effect on one scan's wind, in m/s or degrees: the worst over the retrievals and states given."""
     if not airs:
         return ()
     sizes: dict[str, tuple[Sequence[float | None], str]] = {
@@ -111,7 +111,7 @@ def wind_effects(site: Site, airs: Sequence[Air]) -> tuple[Effect, ...]:
             "gates above and below the target see another wind",
         ),
         "pointing-noise": (
-            [_pointing(air) for air in airs],
+            [_pointing_deg(air) for air in airs],
             "jitter, heading, levelling, position and ranging, beside the noise",
         ),
         "turbulence": ([_turbulence(air) for air in airs], "each ray meets another eddy at another moment"),
@@ -126,7 +126,9 @@ def wind_effects(site: Site, airs: Sequence[Air]) -> tuple[Effect, ...]:
         known = [value for value in values if value is not None]
         size = max(known) if known else None
         reason = text if known else f"{text}; not known: the site declares no turbulence"
-        found.append(_effect(site, name, size, "m/s", site.tolerance.speed_mps, reason))
+        turns = name == "pointing-noise"  # it acts on the direction first
+        unit, tolerance = ("deg", site.tolerance.angle_deg) if turns else ("m/s", site.tolerance.speed_mps)
+        found.append(_effect(site, name, size, unit, tolerance, reason))
     return tuple(found)
 
 
@@ -152,15 +154,11 @@ def _mean_error(air: Air, source: str) -> float:
     return max(float(np.linalg.norm(mean_errors_mps(fit, air.rays, state)[source])) for state in air.states)
 
 
-def _pointing(air: Air) -> float:
-    noise = np.array([each.radial_speed_mps for each in air.sources])[air.rays.lidar]
-    return max(
-        _apart(
-            predict_linear(air.rays, state, air.sources).covariance_m2s2,
-            predict_noise(air.rays, state, noise).covariance_m2s2,
-        )
-        for state in air.states
-    )
+def _pointing_deg(air: Air) -> float:
+    """Scatter of one scan's direction from everything but the noise of the radial speed [deg]."""
+    quiet = [replace(each, radial_speed_mps=0.0) for each in air.sources]
+    found = [predict_linear(air.rays, state, quiet).direction_std_deg for state in air.states]
+    return max((value for value in found if value is not None), default=0.0)
 
 
 def _turbulence(air: Air) -> float | None:

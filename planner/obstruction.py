@@ -51,7 +51,10 @@ class _Things(NamedTuple):
 def obstructions(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[Obstruction, ...]:
     """Everything that a ray of some scan touches or passes within its margin."""
     return tuple(
-        found for layout in layouts for things in _around(places, layout) for found in _of_kind(layout, things)
+        found
+        for layout in layouts
+        for things in _around(places, layout)
+        for found in _of_kind(layout, things)
     )
 
 
@@ -75,6 +78,12 @@ def margin_m(lidar: Lidar, range_m: float) -> float:
     """How far a lidar's beam may be off at a range [m]: two standard deviations of pointing and position.
 
     The worse of both directions counts: azimuth and heading to the side, elevation and levelling in height.
+
+    Examples
+    --------
+    >>> lidar = Lidar(name="A", position=(0.0, 0.0, 0.0), instrument="windscanner-200s")
+    >>> round(margin_m(lidar, 1000.0), 2)
+    2.48
     """
     unsure = lidar.uncertainty
     sideways_deg = np.hypot(unsure.azimuth_deg, unsure.heading_deg)
@@ -128,7 +137,9 @@ def _around(places: Places, layout: ScanLayout) -> Iterator[_Things]:
         bases = seen([mast.position for mast in masts])
         radius = [mast.width_m / 2 for mast in masts]
         top = bases[:, 2] + [mast.height_m for mast in masts]
-        yield _Things("mast", [mast.name for mast in masts], Cylinders(bases[:, :2], radius, bases[:, 2], top))
+        yield _Things(
+            "mast", [mast.name for mast in masts], Cylinders(bases[:, :2], radius, bases[:, 2], top)
+        )
     if site.obstacles:
         yield _obstacles(site, seen, places.convergence_deg(layout.lidar))
 

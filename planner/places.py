@@ -32,8 +32,16 @@ class Places:
     """The site's frame and the positions of its things, east, north, up from one origin.
 
     The origin lies in the middle of lidars and targets, at ground level. A local frame that is flat is tilted
-    against the horizontal of a lidar d metres away by d/R: 0.009° at 1 km. Angles that an instrument is pointed
-    with are therefore never taken from here but from the lidar's own frame (`planner.pointing`).
+    against the horizontal of a lidar d metres away by d/R: 0.009° at 1 km. Angles that an instrument is
+    pointed with are therefore never taken from here but from the lidar's own frame (`planner.pointing`).
+
+    Examples
+    --------
+    >>> from planner.site import Target
+    >>> target = Target(name="T", position=(500000.0, 6250000.0, 100.0))
+    >>> site = Site(name="Moor", crs="EPSG:32632", ground_height_m=10.0, targets=(target,))
+    >>> (Places(site).local_m([500000.0, 6250000.0, 100.0]).round(3) + 0.0).tolist()
+    [0.0, 0.0, 90.0]
     """
 
     site: Site
@@ -57,11 +65,11 @@ class Places:
         InputError
             If nothing stands on the site.
         """
-        marks = self.aimed_m or tuple(item.position for item in (*self.site.masts, *self.site.turbines))
+        standing = [mast.position for mast in self.site.masts]
+        standing += [turbine.position for turbine in self.site.turbines]
+        marks = self.aimed_m or standing
         if not marks:
-            raise InputError(
-                "the site has nothing in it: give at least one lidar, mast, turbine or target"
-            )
+            raise InputError("the site has nothing in it: give at least one lidar, mast, turbine or target")
         easting_northing = np.asarray(marks, dtype=np.float64)[:, :2]
         middle = (easting_northing.min(axis=0) + easting_northing.max(axis=0)) / 2
         return np.array([*middle, self.site.ground_m])
@@ -130,7 +138,7 @@ class Places:
         return float(self.frame.convergence_deg(lidar.position))
 
     def mounting(self, lidar: Lidar) -> Mounting:
-        """How the lidar's head stands against true north: a zero at grid north is turned by the convergence."""
+        """How the lidar's head stands against true north: the convergence turns a zero at grid north."""
         zero_deg = self.convergence_deg(lidar) if lidar.north == "grid" else 0.0
         return Mounting(
             heading_deg=lidar.mounting.heading_deg + zero_deg,
@@ -157,5 +165,7 @@ class Places:
         return Rotors(
             hub_m=self.hubs_m,
             diameter_m=np.array([turbine.rotor_diameter_m for turbine in turbines], dtype=np.float64),
-            thrust_coefficient=np.array([turbine.thrust_coefficient for turbine in turbines], dtype=np.float64),
+            thrust_coefficient=np.array(
+                [turbine.thrust_coefficient for turbine in turbines], dtype=np.float64
+            ),
         )

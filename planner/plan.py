@@ -10,27 +10,23 @@ from typing import TYPE_CHECKING
 
 from geometry.angles import SectorSet, difference_deg, wrap_180_deg
 from geometry.disturbed import any_of
+from planner.budget import Budget, mast_of, ten_minute_budget
 from planner.crossings import PairCrossing, crossings
-from planner.error_curve import (
-    ErrorCurve,
-    SizesFrom,
-    air_of_pair,
-    airs_of_scan,
-    default_tier,
-    pair_curve,
-    sector_curve,
-)
+from planner.error_curve import SizesFrom, default_sizes, default_tier, pair_curve, sector_curve
+from planner.error_model import air_of_narrowest, air_of_pair, air_of_scan
+from planner.error_nouns import ErrorCurve
 from planner.exclusion import Exclusion, Near, exclusions, near_wakes, wanted_directions
 from planner.fidelity import Air, Effect, earth_model, geometric_effects, left_out, wind_effects
 from planner.obstruction import Obstruction, obstructions
 from planner.places import Places
 from planner.pointing import Pointing, pointings
+from planner.ray_sets import own_scan
 from planner.scan_layout import ScanLayout, lay_out
 from planner.sector_size import Recommendation, recommend
 from planner.site import Pair, Site
-from reconstruct.prediction import Tier
 from planner.wind_climate import largest_gust_mps
 from planner.wind_rose import prevailing_deg
+from reconstruct.prediction import Tier
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -65,15 +61,32 @@ class Plan:
         return (*self.geometric_effects, *wind_effects(self.site, self._airs))
 
     @cached_property
-    def _airs(self) -> tuple[Air, ...]:
-        """Each sector scan (at its widest and narrowest) and pair in the middle of the wind's speeds, from each of its directions."""
-        airs = [
-            air
-            for item in self.exclusions
-            if self.layout[item.scan].spec.type == "sector"
-            for air in airs_of_scan(self.places, self.layout[item.scan], item)
+    def _declared_airs(self) -> tuple[tuple[str, str, Air], ...]:
+        """Every sector scan and pair as declared, with its target, in the middle of the wind's speeds."""
+        scans = [
+            (item.scan, item.target, air_of_scan(self.places, self.layout[item.scan], item))
+            for item in self._sectors
         ]
-        return (*airs, *(air_of_pair(self.places, pair, *self._pair(pair)) for pair in self.site.pairs))
+        pairs = [
+            (pair.name, pair.target, air_of_pair(self.places, pair, *self._pair(pair)))
+            for pair in self.site.pairs
+        ]
+        return (*scans, *pairs)
+
+    @cached_property
+    def _airs(self) -> tuple[Air, ...]:
+        """The same, and every sector scan at its narrowest size, which feels most effects most."""
+        narrow = [
+            air_of_narrowest(self.places, layout, own_scan(layout, default_sizes(layout)[-1]), item)
+            for item in self._sectors
+            for layout in [self.layout[item.scan]]
+        ]
+        return (*(air for _, _, air in self._declared_airs), *narrow)
+
+    @cached_property
+    def _sectors(self) -> tuple[Exclusion, ...]:
+        """The exclusions of sector scans."""
+        return tuple(item for item in self.exclusions if self.layout[item.scan].spec.type == "sector")
 
     def _pair(self, pair: Pair) -> tuple[tuple[ScanLayout, ...], SectorSet]:
         """The scans of a pair, and the directions in which a wake touches what any of them measures."""
@@ -116,6 +129,7 @@ class Plan:
         tier: Tier | None = None,
         sizes_deg: Sequence[float] | None = None,
         sizes_from: SizesFrom = "own",
+        progress: "Progress | None" = None,
     ) -> tuple[ErrorCurve, ...]:
         """Predicted error of every sector scan at each of its targets, for each size, then of every pair.
 
@@ -127,6 +141,8 @@ class Plan:
             Sector sizes [deg]; default: each scan's declared one and the usual smaller ones.
         sizes_from
             "own" or "subset", see `error_curve.sector_curve`.
+        progress
+            Gets the share of the work that is done for each curve, in the Monte Carlo tier.
         """
         simpler = left_out(self.fidelity)
         chosen = tier or default_tier(self.site, simpler)
@@ -139,12 +155,12 @@ class Plan:
                 sizes_deg=sizes_deg,
                 sizes_from=sizes_from,
                 left_out=simpler,
+                progress=progress,
             )
-            for item in self.exclusions
-            if self.layout[item.scan].spec.type == "sector"
+            for item in self._sectors
         ]
         pairs = [
-            pair_curve(self.places, pair, *self._pair(pair), tier=chosen, left_out=simpler)
+            pair_curve(self.places, pair, *self._pair(pair), tier=chosen, left_out=simpler, progress=progress)
             for pair in self.site.pairs
         ]
         return (*sectors, *pairs)
@@ -153,6 +169,14 @@ class Plan:
     def default_errors(self) -> tuple[ErrorCurve, ...]:
         """The errors by the default tier and sizes, once."""
         return self.errors()
+
+    @cached_property
+    def budgets(self) -> tuple[Budget, ...]:
+        """Uncertainty budget of the ten-minute means of every declared sector scan and every pair."""
+        return tuple(
+            ten_minute_budget(name, target, air, mast_of(self.places, target))
+            for name, target, air in self._declared_airs
+        )
 
     def trades(self, *, rng: "Generator", progress: "Progress | None" = None) -> "tuple[Trade, ...]":
         """Time and error of every cheaper way on this machine: each call measures anew."""

@@ -1,7 +1,8 @@
-"""Plan -> Scene: what stands on the site, where the beams go and what they measure, in the site's local metres."""
+"""Plan -> Scene: what stands on the site, where beams go and what they measure, in its local metres."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
@@ -15,14 +16,20 @@ from planner.palette import EXCLUDED, OBSTACLE, lidar_colour
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
 from planner.scene import Label, Layer, Points, Scene, layers, views
-from planner.scene.model import positions_m
+from planner.scene.model import View, positions_m
 from planner.scene.structures import obstacle
 
+UP = np.array([0.0, 0.0, 1.0])
 GROUND_M = 0.0  # the site's local frame has its origin at ground level
 WAKE_DIAMETERS = 8  # how much of a wake is drawn; a wake goes on
 RING_SHARE = (0.8, 1.0)  # inner and outer radius of the excluded directions, of `ring_m`
 RING_OF_RANGE = 0.2  # outer radius, as a share of the range to the target
 CLOSE_UP_M = 150.0  # half of what is seen around the first target
+ASPECT = 1.2  # width of the overview over its height
+FIELD_DEG = 45.0  # vertical field of view: plotly's own, so that page and picture begin alike
+LONGEST = 28  # characters of a name in the scene; the tables have it whole
+ROOM = 0.09  # share of the overview left free on each side, for names at its border
+RING_LIFT = 0.02  # of the ring's radius: nearer to the ground it flickers in a browser
 WAKE_LIFT_M = 0.5  # wakes end above the ground: two surfaces in one place flicker
 AWAY_NEAR = ("wakes", "excluded", "north and scale")  # layers that would cover the close-up
 MOST_RAYS = 400  # a scan of more is drawn with every so manieth ray
@@ -44,18 +51,58 @@ def plan_scene(plan: Plan) -> Scene:
     points = np.concatenate([positions_m(item) for layer in (*standing, ground[2]) for item in layer.items])
     wind_deg = plan.prevailing_deg
     turned = bool(plan.site.turbines) and bool(np.isfinite(wind_deg))
-    overview = views.overview(points, named, facing_deg=wind_deg if turned else None)
+    side_deg = views.azimuth_of_deg(views.overview(points, named, facing_deg=wind_deg if turned else None))
+    overview = views.view_from(
+        "overview",
+        points,
+        side_deg,
+        views.OVERVIEW_ELEVATION_DEG,
+        aspect=ASPECT,
+        view_angle_deg=FIELD_DEG,
+        margin=ROOM,
+    )
     around = [*_excluded(plan)]
-    hidden = tuple(layer.name for layer in (*around, ground[2], *standing) if layer.name.startswith(AWAY_NEAR))
+    drawn = _named_shortly([*ground, *around, *standing])
+    hidden = tuple(layer.name for layer in drawn if layer.name.startswith(AWAY_NEAR))
     note = f"wakes and rotors in the prevailing wanted wind, from {wind_deg:.0f}°" if turned else ""
-    return Scene(plan.site.name, (*ground, *around, *standing), (overview, *_close_ups(plan, overview, hidden)), note=note)
+    return Scene(
+        _short(plan.site.name, 2 * LONGEST), drawn, (overview, *_close_ups(plan, overview, hidden)), note=note
+    )
 
 
-def _local_directions(plan: Plan, layout: ScanLayout, rays: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Head (3,), azimuths and elevations (ray,) of a scan in the site's frame, whose up is not quite the lidar's."""
+def _named_shortly(drawn: Sequence[Layer]) -> tuple[Layer, ...]:
+    """Names and labels that leave room for the scene, and no layer's name twice."""
+    named: list[Layer] = []
+    for layer in drawn:
+        name = _short(layer.name, 2 * LONGEST)
+        items = tuple(
+            replace(item, text=_short(item.text, 2 * LONGEST)) if isinstance(item, Label) else item
+            for item in layer.items
+        )
+        named.append(replace(layer, name=_other(name, {other.name for other in named}), items=items))
+    return tuple(named)
+
+
+def _other(name: str, taken: set[str]) -> str:
+    """The name, with a number where it is taken already."""
+    numbered = (name if number == 1 else f"{name} ({number})" for number in count(1))
+    return next(text for text in numbered if text not in taken)
+
+
+def _short(text: str, longest: int = LONGEST) -> str:
+    return text if len(text) <= longest else text[: longest - 1].rstrip() + "…"
+
+
+def _local_directions(
+    plan: Plan, layout: ScanLayout, rays: slice
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Head (3,), azimuths and elevations (ray,) of a scan in the site's frame; its up is not the lidar's."""
     scan = layout.scan
     ends = plan.places.beam_local_m(
-        layout.lidar, scan.azimuth_deg[rays], scan.elevation_deg[rays], np.full(len(scan.azimuth_deg[rays]), 1000.0)
+        layout.lidar,
+        scan.azimuth_deg[rays],
+        scan.elevation_deg[rays],
+        np.full(len(scan.azimuth_deg[rays]), 1000.0),
     )
     head = plan.places.local_m(layout.lidar.position)
     beam = beam_to(ends - head)
@@ -67,7 +114,11 @@ def _scans(plan: Plan) -> Iterator[Layer]:
     for layout in plan.layouts:
         layer = _scan(plan, layout)
         if layout.lidar.name in named:  # a lidar with two scans has one name and one dot
-            kept = tuple(item for item in layer.items if not isinstance(item, Label) and not (isinstance(item, Points) and item.is_symbol))
+            kept = tuple(
+                item
+                for item in layer.items
+                if not isinstance(item, Label) and not (isinstance(item, Points) and item.is_symbol)
+            )
             layer = replace(layer, items=kept)
         named.add(layout.lidar.name)
         yield layer
@@ -82,7 +133,7 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
     measured_m, probe_m = layout.target_range_m or last_m, layout.probe.length_m
     if layout.scan.count == 1:
         return layers.stare_layer(
-            layout.lidar.name,
+            _short(layout.lidar.name),
             colour,
             head,
             float(azimuth_deg[0]),
@@ -91,10 +142,10 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
             measured_range_m=measured_m,
             probe_length_m=probe_m,
             ground_m=GROUND_M,
-            scan=layout.name,
+            scan=_short(layout.name),
         )
     return layers.fan_layer(
-        layout.lidar.name,
+        _short(layout.lidar.name),
         colour,
         head,
         azimuth_deg,
@@ -103,7 +154,7 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
         measured_range_m=measured_m,
         probe_length_m=probe_m,
         closed=layout.spec.type == "ppi",
-        scan=layout.name,
+        scan=_short(layout.name),
     )
 
 
@@ -118,7 +169,11 @@ def _targets(plan: Plan) -> Iterator[Layer]:
         spots = [plan.places.local_m(position) for _, position in things]
         if spots:
             dots = Points(np.stack(spots), size_px=12.0, hover=tuple(text for text, _ in things))
-            yield Layer(name, colour, (dots, *(Label(text, at) for (text, _), at in zip(things, spots, strict=True))))
+            yield Layer(
+                name,
+                colour,
+                (dots, *(Label(_short(text), at) for (text, _), at in zip(things, spots, strict=True))),
+            )
 
 
 def _structures(plan: Plan) -> Iterator[Layer]:
@@ -126,11 +181,14 @@ def _structures(plan: Plan) -> Iterator[Layer]:
     if site.masts:
         bases = local([mast.position for mast in site.masts])
         yield layers.mast_layer(
-            [mast.name for mast in site.masts], bases, [mast.height_m for mast in site.masts], [mast.width_m for mast in site.masts]
+            [_short(mast.name) for mast in site.masts],
+            bases,
+            [mast.height_m for mast in site.masts],
+            [mast.width_m for mast in site.masts],
         )
     if site.turbines:
         yield layers.turbine_layer(
-            [turbine.name for turbine in site.turbines],
+            [_short(turbine.name) for turbine in site.turbines],
             local([turbine.position for turbine in site.turbines]),
             [turbine.hub_height_m for turbine in site.turbines],
             [turbine.rotor_diameter_m for turbine in site.turbines],
@@ -148,7 +206,10 @@ def _structures(plan: Plan) -> Iterator[Layer]:
             )
             for item in site.obstacles
         ]
-        names = [Label(item.name, local(item.position) + [0.0, 0.0, item.height_m], rank=2) for item in site.obstacles]
+        names = [
+            Label(_short(item.name), local(item.position) + item.height_m * UP, rank=2)
+            for item in site.obstacles
+        ]
         yield Layer("obstacles", OBSTACLE, (*boxes, *names))
 
 
@@ -158,7 +219,7 @@ def _wakes(plan: Plan) -> Iterator[Layer]:
     if turbines and np.isfinite(wind_deg):
         diameters = [turbine.rotor_diameter_m for turbine in turbines]
         yield layers.wake_layer(
-            [turbine.name for turbine in turbines],
+            [_short(turbine.name) for turbine in turbines],
             plan.places.hubs_m,
             diameters,
             wind_from_deg=round(wind_deg),
@@ -169,7 +230,7 @@ def _wakes(plan: Plan) -> Iterator[Layer]:
 
 
 def _excluded(plan: Plan) -> Iterator[Layer]:
-    """On the ground around the first target, the directions in which a wake touches what the worst scan measures."""
+    """Around the target of the scan that wakes take most from, the directions in which they do."""
     items = [item for item in plan.exclusions if item.excluded.sectors]
     if items:
         worst = max(items, key=lambda item: item.excluded.width_deg)
@@ -178,11 +239,11 @@ def _excluded(plan: Plan) -> Iterator[Layer]:
         yield layers.direction_layer(
             "excluded",
             EXCLUDED,
-            [target[0], target[1], GROUND_M],
+            [target[0], target[1], GROUND_M + RING_LIFT * radius_m],
             RING_SHARE[1] * radius_m,
             [(sector.from_deg, sector.width_deg) for sector in worst.excluded.sectors],
             inner_m=RING_SHARE[0] * radius_m,
-            about=f"winds that bring a wake into what {worst.scan} measures",
+            about="winds with a wake in what is measured",
         )
 
 
@@ -197,12 +258,18 @@ def _crossing(plan: Plan, met: PairCrossing) -> Iterator[Layer]:
     lines = [beam_line(plan.places, plan.layout[name], met.target) for name in (met.scan1, met.scan2)]
     points = cross(*lines[0], *lines[1])
     if np.all(np.isfinite([points.point1_m, points.point2_m])):
-        text = f"{met.pair}: {met.opening_angle_deg:.0f}°, gap {met.gap_m:.1f} m"
+        text = f"{_short(met.pair)}: {met.opening_angle_deg:.0f}°, gap {met.gap_m:.1f} m"
         yield layers.crossing_layer("crossing", text, points.point1_m, points.point2_m, ground_m=GROUND_M)
 
 
-def _close_ups(plan: Plan, overview: views.View, hidden: tuple[str, ...]) -> Iterator[views.View]:
+def _close_ups(plan: Plan, overview: View, hidden: tuple[str, ...]) -> Iterator[View]:
     """A second view, of the first target."""
     if plan.site.targets:
         target = plan.places.local_m(plan.site.target_position_m(plan.site.targets[0]))
-        yield views.close_up(target, CLOSE_UP_M, views.azimuth_of_deg(overview), name=f"at {plan.site.targets[0].name}", without=hidden)
+        yield views.close_up(
+            target,
+            CLOSE_UP_M,
+            views.azimuth_of_deg(overview),
+            name=f"at {_short(plan.site.targets[0].name)}",
+            without=hidden,
+        )

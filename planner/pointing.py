@@ -27,7 +27,7 @@ class Pointing(NamedTuple):
     gate_index: int | None  # of the lidar's scan at this target; None without gates there
     gate_centre_m: float | None
     convergence_deg: float
-    refraction_deg: float  # add to the elevation to hit the target: the beam bends down by this much; not inside elevation_deg
+    refraction_deg: float  # to add to the elevation: the beam bends down by so much; not in elevation_deg
     scan: str | None
 
 
@@ -42,8 +42,8 @@ def pointings(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[Pointing
     site = places.site
     if not site.lidars or not site.targets:
         raise InputError(
-            f"the site has {len(site.lidars)} lidars and {len(site.targets)} targets; pointing needs at least one "
-            "of each: add them to the site file"
+            f"the site has {len(site.lidars)} lidars and {len(site.targets)} targets; pointing needs at "
+            "least one of each: add them to the site file"
         )
     return tuple(
         point(places, lidar, target.name, _scan_at(layouts, lidar.name, target.name))
@@ -53,7 +53,24 @@ def pointings(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[Pointing
 
 
 def point(places: Places, lidar: Lidar, target: str, layout: ScanLayout | None) -> Pointing:
-    """Point one lidar at one target (or hard target), always by the exact model."""
+    """Point one lidar at one target (or hard target), always by the exact model.
+
+    Parameters
+    ----------
+    places
+        Where the site's things stand.
+    lidar
+        Which one points.
+    target
+        Name of a target or hard target.
+    layout
+        The lidar's scan at it, for the gate; None without one.
+
+    Returns
+    -------
+    Pointing
+        Angles from true north, grid north and as the head shows them.
+    """
     position = places.site.target_position_m(target)
     beam = beam_to(places.frame.enu_m(lidar.position, position))
     azimuth_deg, elevation_deg, range_m = (float(value) for value in beam)

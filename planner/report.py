@@ -1,12 +1,13 @@
-"""The report: everything about one site, or two side by side, on one page that loads nothing, and its tables as CSV.
+"""The report: everything about one site, or two side by side, on one page, and its tables as CSV.
 
-Names in a site file are untrusted text. Every one reaches the page through the template's escaping; the page's content
-security policy forbids loading anything and runs only the scripts whose digests it lists, so that a script in a name
-would not run even if it got there.
+Names in a site file are untrusted text. Every one reaches the page through the template's escaping; the
+page's content security policy forbids loading anything and runs only the scripts whose digests it lists, so
+that a script in a name would not run even if it got there.
 """
 
 from base64 import b64encode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -14,11 +15,14 @@ from io import BytesIO
 from pathlib import Path
 from re import DOTALL, findall
 
+from markupsafe import Markup
+
 from geometry.errors import UnavailableError
 from planner import palette
 from planner.assumptions import assumptions
 from planner.checks import findings
 from planner.exclusion import Exclusion
+from planner.figures.canvas import DPI
 from planner.figures.map_layers import most_lost
 from planner.figures.sector_error import sector_error
 from planner.figures.site_map import site_map
@@ -35,18 +39,20 @@ from planner.report_tables import (
     errors_table,
     fidelity_table,
     findings_table,
+    pair_table,
     pointing_table,
     scan_table,
     size_table,
     unknown_numbers,
     wake_table,
 )
-from planner.report_values import Column, Table, csv_text, percent, quantity
-from planner.scene import Scene
+from planner.report_values import DASH, Column, Table, csv_text, percent, quantity
+from planner.scene import Scene, opengl
 
 PAGE = "report.html"
 SITE_COLUMN = Column("site", "site")
-PICTURE_PX = (1400, 875)
+PICTURE_PX = (1280, 800)
+SCREEN_DPI = 96  # of a style sheet's pixels; figures have more, for paper and fine screens
 
 Progress = Callable[[str], None]
 
@@ -119,12 +125,22 @@ def write_report(plans: Sequence[Plan], folder: Path, *, progress: Progress = la
         If the folder cannot be written to, or a plan's numbers make no report.
     """
     reports = [SiteReport(plan, number) for number, plan in enumerate(plans, start=1)]
-    with output_folder(folder) as staging:
+    with output_folder(folder) as staging, _asking_for_opengl():
         texts = {f"{name}.csv": _csv(reports, name) for name in CSV_TABLES}
         texts = {PAGE: _page(reports, progress), **texts}
         for name, text in texts.items():
             (staging / name).write_text(text, encoding="utf-8")
     return [folder / name for name in texts]
+
+
+@contextmanager
+def _asking_for_opengl() -> Iterator[None]:
+    """Ask a child process whether this machine can draw while this one computes: it takes a second."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        pool.submit(opengl.off_screen_window)
+        yield
 
 
 def report_html(plans: Sequence[Plan], *, progress: Progress = lambda _: None) -> str:
@@ -135,20 +151,28 @@ def report_html(plans: Sequence[Plan], *, progress: Progress = lambda _: None) -
 def _csv(reports: Sequence[SiteReport], name: str) -> str:
     """One table of all sites, the site's name in the first column."""
     tables = [(report.plan.site.name, report.tables[name]) for report in reports]
-    rows = [(site, *row) for site, table in tables for row in table.rows]
-    return csv_text((SITE_COLUMN, *tables[0][1].columns), rows)
+    rows = [(site, *row) for site, table in tables for row in table.file_rows]
+    return csv_text((SITE_COLUMN, *tables[0][1].file_columns), rows)
 
 
 def _page(reports: Sequence[SiteReport], progress: Progress) -> str:
     from importlib.resources import files
 
     from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
 
     sites = [_site(report, progress) for report in reports]
-    scripts = [script for site in sites for script in findall(r"<script[^>]*>(.*?)</script>", str(site["scene_div"]), DOTALL)]
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(files("planner.templates").joinpath("report.html.j2").read_text(encoding="utf-8"))
+    scripts = [
+        script
+        for site in sites
+        for script in findall(r"<script[^>]*>(.*?)</script>", str(site["scene_div"]), DOTALL)
+    ]
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["picture"] = _attributes
+    template = environment.from_string(
+        files("planner.templates").joinpath("report.html.j2").read_text(encoding="utf-8")
+    )
     return template.render(
         sites=[{**site, "scene_div": Markup(site["scene_div"])} for site in sites],
         rows=list(zip(*(report.numbers for report in reports), strict=True)),
@@ -160,7 +184,9 @@ def _page(reports: Sequence[SiteReport], progress: Progress) -> str:
 
 def _policy(scripts: Sequence[str]) -> str:
     """Nothing may be loaded; of scripts only these run (plotly's 3-D needs eval)."""
-    digests = " ".join(f"'sha256-{b64encode(sha256(script.encode('utf-8')).digest()).decode()}'" for script in scripts)
+    digests = " ".join(
+        f"'sha256-{b64encode(sha256(script.encode('utf-8')).digest()).decode()}'" for script in scripts
+    )
     return (
         f"default-src 'none'; script-src {digests} 'unsafe-eval'; style-src 'unsafe-inline'; "
         "img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'"
@@ -178,10 +204,10 @@ def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
         "summary": _summary(report),
         "numbers": report.numbers,
         "tables": report.tables,
-        "map": _inline(site_map(plan)),
-        "rose": _inline(wake_rose(plan)),
+        "map": site_map(plan),
+        "rose": wake_rose(plan),
         "free": [_free_sentence(item) for item in most_lost(plan)],
-        "errors": [_error_part(entry) for entry in report.errors],
+        "errors": _error_parts(report.errors),
         "assumptions": assumptions(plan.site),
         "findings": report.findings,
         "convergence_deg": plan.convergence_deg,
@@ -199,13 +225,13 @@ def _summary(report: SiteReport) -> str:
         ("of that wind lost to wakes, worst scan", "{} of the wanted wind lost to wakes"),
         ("recommended sector", "recommended sector {}"),
     ):
-        if main[label] != "–" and not main[label].startswith("none"):
+        if not main[label].startswith((DASH, "none")):
             parts.append(words.format(main[label]))
     return "; ".join(parts) + "."
 
 
 def _free_sentence(item: Exclusion) -> dict[str, str]:
-    """What the site file declares beside what is found, for the scan at a target that wakes take most from."""
+    """What the site file declares beside what is found, for a target's scan that wakes take most from."""
     return {
         "scan": item.scan,
         "target": item.target,
@@ -217,12 +243,40 @@ def _free_sentence(item: Exclusion) -> dict[str, str]:
     }
 
 
-def _error_part(entry: Entry) -> dict[str, object]:
-    """Table, figure and words of one curve."""
-    best = entry["recommended_sector_deg"]
-    title = f"{entry['scan']} at {entry['target']}, tier {entry['tier']}"
-    figure = sector_error([tier_curve(entry)], title=title, recommended_deg=best) if len(entry["sizes"]) > 1 else None
-    return {"entry": entry, "table": size_table(entry), "figure": _inline(figure), "unknown": unknown_numbers(entry)}
+def _error_parts(entries: Sequence[Entry]) -> list[dict[str, object]]:
+    """Tables, figures and words: one part for each sector scan, then one for all pairs."""
+    pairs = [entry for entry in entries if "pair" in entry]
+    parts = [_sector_part(entry) for entry in entries if "pair" not in entry]
+    if pairs:
+        parts.append(
+            {
+                "title": "Pairs",
+                "entry": pairs[0],
+                "best": None,
+                "table": pair_table(pairs),
+                "figure": None,
+                "unknown": unknown_numbers(pairs),
+            }
+        )
+    return parts
+
+
+def _sector_part(entry: Entry) -> dict[str, object]:
+    best, sizes = entry["recommended_sector_deg"], [size["sector_deg"] for size in entry["sizes"]]
+    title = f"{entry['scan']} → {entry['target']}"
+    figure = (
+        sector_error([tier_curve(entry)], title=f"{title}, tier {entry['tier']}", recommended_deg=best)
+        if len(sizes) > 1
+        else None
+    )
+    return {
+        "title": title,
+        "entry": entry,
+        "best": sizes.index(best) if best is not None and best in sizes else None,
+        "table": size_table(entry),
+        "figure": figure,
+        "unknown": unknown_numbers([entry]),
+    }
 
 
 def _scene_part(report: SiteReport) -> dict[str, object]:
@@ -232,7 +286,7 @@ def _scene_part(report: SiteReport) -> dict[str, object]:
     first = report.number == 1
     name = f"scene-{report.number}"
     try:
-        picture, reason = _inline(_picture(report.scene)), ""
+        picture, reason = _picture(report.scene), ""
     except UnavailableError as error:
         picture, reason = None, str(error)
     return {
@@ -253,6 +307,8 @@ def _picture(scene: Scene) -> bytes:
     return buffer.getvalue()
 
 
-def _inline(picture: bytes | None) -> str | None:
-    """A PNG as text for the page."""
-    return None if picture is None else f"data:image/png;base64,{b64encode(picture).decode()}"
+def _attributes(picture: bytes, dpi: int = DPI) -> Markup:
+    """Source, width and height of an image tag; a PNG says its size in bytes 16 to 24."""
+    width, height = (round(int.from_bytes(picture[i : i + 4]) * SCREEN_DPI / dpi) for i in (16, 20))
+    data = b64encode(picture).decode()
+    return Markup(f'src="data:image/png;base64,{data}" width="{width}" height="{height}"')

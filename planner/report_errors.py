@@ -1,4 +1,4 @@
-"""The report's part about errors: what the plan predicts, as plain dicts, as arrays for the figure, and as key numbers."""
+"""What a plan predicts about errors: as plain dicts for tables, as arrays for the figure."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import FloatArray
-from planner.error_curve import ErrorCurve
+from planner.error_nouns import ErrorCurve
 from planner.figures.sector_error import TierCurve
 from planner.plan import Plan
 
@@ -46,7 +46,9 @@ def tier_curve(entry: Entry) -> TierCurve:
     """
 
     def values(key: str) -> FloatArray:
-        return np.array([np.nan if size.get(key) is None else size[key] for size in entry["sizes"]], dtype=np.float64)
+        return np.array(
+            [np.nan if size.get(key) is None else size[key] for size in entry["sizes"]], dtype=np.float64
+        )
 
     return TierCurve(entry["tier"], *(values(key) for key in TierCurve._fields[1:]))
 
@@ -55,4 +57,7 @@ def recommended_size(entry: Entry) -> Entry | None:
     """The numbers of the recommended size, else of the first (widest, or the only one of a pair)."""
     best = entry.get("recommended_sector_deg")
     sizes: list[Entry] = entry["sizes"]
-    return next((size for size in sizes if best is not None and size["sector_deg"] == best), sizes[0] if sizes else None)
+    return next(
+        (size for size in sizes if best is not None and size["sector_deg"] == best),
+        sizes[0] if sizes else None,
+    )

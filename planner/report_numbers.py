@@ -1,4 +1,4 @@
-"""The numbers that a reader looks for first: one line of summary, and rows that set two sites side by side."""
+"""The numbers that a reader looks for first, the same rows for every site."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -45,7 +45,13 @@ def finding_counts(findings: Sequence[Finding]) -> str:
 
 def key_numbers(plan: Plan, findings: Sequence[Finding], entries: Sequence[Entry]) -> list[KeyNumber]:
     """The rows of one site, always the same ones in the same order."""
-    return [KeyNumber("findings", finding_counts(findings)), *_layout(plan), *_scanning(plan), *_wind(plan), *_errors(entries)]
+    return [
+        KeyNumber("findings", finding_counts(findings)),
+        *_layout(plan),
+        *_scanning(plan),
+        *_wind(plan),
+        *_errors(entries),
+    ]
 
 
 def _layout(plan: Plan) -> Iterator[KeyNumber]:
@@ -76,21 +82,29 @@ def _wind(plan: Plan) -> Iterator[KeyNumber]:
     worst = max(plan.exclusions, key=lambda item: item.lost_share, default=None)
     yield KeyNumber(
         "of that wind lost to wakes, worst scan",
-        DASH if worst is None else f"{percent(worst.lost_share)} ({worst.scan} → {worst.target})",
+        "none"
+        if worst is None or worst.lost_share == 0
+        else f"{percent(worst.lost_share)} ({worst.scan} → {worst.target})",
     )
-    yield KeyNumber("counts and free of wakes, worst scan", DASH if worst is None else directions(worst.wanted.intersection(worst.free)))
+    yield KeyNumber(
+        "counts and free of wakes, worst scan",
+        DASH if worst is None else directions(worst.wanted.intersection(worst.free)),
+    )
 
 
 def _errors(entries: Sequence[Entry]) -> Iterator[KeyNumber]:
-    sectors = [entry for entry in entries if entry.get("lidar")]
-    advice = [f"{_size(entry['recommended_sector_deg'])} ({entry['scan']} → {entry['target']})" for entry in sectors]
+    sectors = [entry for entry in entries if entry["recommended_sector_deg"] is not None]
+    advice = [
+        f"{_size(entry['recommended_sector_deg'])} ({entry['scan']} → {entry['target']})" for entry in sectors
+    ]
     yield KeyNumber("recommended sector", ", ".join(advice) or DASH)
     for label, key, digits in (
         ("speed error of one scan, std [m/s]", "speed_std_mps", 2),
         ("speed error of ten minutes, std [m/s]", "mean10_speed_std_mps", 2),
         ("direction error of one scan, std [°]", "direction_std_deg", 1),
     ):
-        yield KeyNumber(label, ", ".join(_of_entry(entry, key, digits) for entry in entries) or DASH)
+        texts = [_of_entry(entry, key, digits) for entry in entries]
+        yield KeyNumber(label, ", ".join(text for text in texts if not text.startswith(DASH)) or DASH)
 
 
 def _of_entry(entry: Entry, key: str, digits: int) -> str:

@@ -72,9 +72,9 @@ WAKES = (
     Column("free_deg", "free of wakes"),
     Column("wanted_and_free_deg", "counts and free"),
     Column("excluded_point_deg", "excluded at the target point alone"),
-    Column("lost", "of the wind that counts, lost"),
+    Column("lost", "of the wind that counts, lost", in_file=False),
     Column("lost_share", "lost", on_page=False),
-    Column("slowed", "target slowed most, in the wind that counts"),
+    Column("slowed", "target slowed most, in the wind that counts", in_file=False),
     Column("deficit_share", "largest loss of speed", on_page=False),
     Column("deficit_from_deg", "in wind from", on_page=False),
 )
@@ -121,6 +121,8 @@ _ERROR_NUMBERS = (
     Column("direction_residual_std_deg", "direction residual std", "°", 2),
 )
 
+_FIRST_ERROR = 4  # the columns before say what is measured, not how well
+
 ERRORS = (
     Column("lidar", "lidar"),
     Column("scan", "scan or pair"),
@@ -141,8 +143,13 @@ def pointing_table(plan: Plan) -> Table:
 
 def crossing_table(plan: Plan) -> Table:
     """How the beams of each pair meet."""
-    rows = tuple(tuple(_near_enough(column, getattr(met, column.key)) for column in CROSSINGS) for met in plan.crossings)
-    return Table("crossings", "How the beams of each pair meet, from where they really point", CROSSINGS, rows)
+    rows = tuple(
+        tuple(_near_enough(column, getattr(met, column.key)) for column in CROSSINGS)
+        for met in plan.crossings
+    )
+    return Table(
+        "crossings", "How the beams of each pair meet, from where they really point", CROSSINGS, rows
+    )
 
 
 def _near_enough(column: Column, value: Value) -> Value:
@@ -153,7 +160,9 @@ def _near_enough(column: Column, value: Value) -> Value:
 
 def findings_table(findings: Sequence[Finding]) -> Table:
     """All findings, errors first."""
-    return Table("findings", "Findings, errors first", FINDINGS, tuple(tuple(finding) for finding in findings))
+    return Table(
+        "findings", "Findings, errors first", FINDINGS, tuple(tuple(finding) for finding in findings)
+    )
 
 
 def wake_table(plan: Plan) -> Table:
@@ -177,22 +186,33 @@ def wake_table(plan: Plan) -> Table:
         )
         for item in plan.exclusions
     )
-    return Table("wakes", "Wind directions (from) with and without wakes in what each scan measures", WAKES, rows)
+    return Table(
+        "wakes", "Wind directions (from) with and without wakes in what each scan measures", WAKES, rows
+    )
 
 
 def _slowed(item: Exclusion) -> tuple[str, float, float | None]:
-    """By how much wakes slow the wind at the target at most, of the wind that counts, and where it comes from."""
+    """By how much wakes slow the wanted wind at the target at most, and where that wind comes from."""
     from_deg = np.arange(len(item.deficit)) * DEFICIT_STEP_DEG
     counts = np.where(item.wanted.contains(from_deg), item.deficit, 0.0)
     worst = int(np.argmax(counts))
     if counts[worst] <= 0:
         return "not at all", 0.0, None
-    return f"{percent(float(counts[worst]))} in wind from {from_deg[worst]:.0f}°", float(counts[worst]), float(from_deg[worst])
+    return (
+        f"{percent(float(counts[worst]))} in wind from {from_deg[worst]:.0f}°",
+        float(counts[worst]),
+        float(from_deg[worst]),
+    )
 
 
 def scan_table(plan: Plan) -> Table:
     """Rays, times, probes and gates of every scan."""
-    return Table("scans", "Rays, times, probes and gates", SCANS, tuple(_scan_row(plan, layout) for layout in plan.layouts))
+    return Table(
+        "scans",
+        "Rays, times, probes and gates",
+        SCANS,
+        tuple(_scan_row(plan, layout) for layout in plan.layouts),
+    )
 
 
 def _scan_row(plan: Plan, layout: ScanLayout) -> tuple[Value, ...]:
@@ -233,38 +253,68 @@ def fidelity_table(effects: Sequence[Effect]) -> Table:
         )
         for effect in effects
     )
-    return Table("fidelity", "Effects with their size in this scene against the tolerance of the site file", FIDELITY, rows)
+    return Table(
+        "fidelity",
+        "Effects with their size in this scene against the tolerance of the site file",
+        FIDELITY,
+        rows,
+    )
 
 
 def errors_table(entries: Sequence[Mapping[str, Any]]) -> Table:
-    """Predicted errors of every scan and pair, one row a size, out of what `lidarplan errors --json` gives."""
-    return Table("errors", "Predicted errors", ERRORS, tuple(row for entry in entries for row in _error_rows(entry)))
+    """Predicted errors of every scan and pair, a row a size, out of what `lidarplan errors --json` gives."""
+    return Table(
+        "errors", "Predicted errors", ERRORS, tuple(row for entry in entries for row in _error_rows(entry))
+    )
 
 
 def size_table(entry: Mapping[str, Any]) -> Table:
-    """One scan's or pair's predicted errors on the page: columns of which nothing is known are left out."""
-    numbers = [[size.get(column.key) for column in _ERROR_NUMBERS] for size in entry["sizes"]]
-    known = [any(row[i] is not None for row in numbers) for i in range(len(_ERROR_NUMBERS))]
-    rows = tuple(tuple(value for value, keep in zip(row, known, strict=True) if keep) for row in numbers)
-    columns = tuple(column for column, keep in zip(_ERROR_NUMBERS, known, strict=True) if keep)
-    caption = f"{entry['scan']} at {entry['target']}: predicted error, tier {entry['tier']}"
-    return Table("sizes", caption, columns, rows)
+    """One sector scan's predicted errors on the page, a row a size."""
+    caption = f"{entry['scan']} → {entry['target']}: predicted error, tier {entry['tier']}"
+    return _known_columns(caption, (), [((), size) for size in entry["sizes"]])
 
 
-def unknown_numbers(entry: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What no size knows, as (names, reason): the reasons that the tier gives, each once."""
+def pair_table(entries: Sequence[Mapping[str, Any]]) -> Table:
+    """All pairs' predicted errors on the page, a row a pair."""
+    names = (Column("pair", "pair"), Column("target", "target"), Column("tier", "tier"))
+    rows = [
+        ((entry["scan"], entry["target"], entry["tier"]), size)
+        for entry in entries
+        for size in entry["sizes"]
+    ]
+    return _known_columns("Pairs: predicted error", names, rows)
+
+
+def _known_columns(
+    caption: str, names: tuple[Column, ...], rows: Sequence[tuple[tuple[Value, ...], Mapping[str, Any]]]
+) -> Table:
+    """Table of errors without the columns of which nothing is known."""
+    columns = tuple(
+        column for column in _ERROR_NUMBERS if any(size.get(column.key) is not None for _, size in rows)
+    )
+    values = tuple((*given, *(size.get(column.key) for column in columns)) for given, size in rows)
+    return Table("sizes", caption, (*names, *columns), values)
+
+
+def unknown_numbers(entries: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """What no size of some entries knows, as (names, reason): the reasons that the tier gives, each once."""
+    sizes = [size for entry in entries for size in entry["sizes"]]
     by_reason: dict[str, list[str]] = {}
-    for column in _ERROR_NUMBERS[4:]:
-        reasons = [size.get("reasons", {}).get(column.key) for size in entry["sizes"] if size.get(column.key) is None]
-        if reasons and len(reasons) == len(entry["sizes"]):
-            by_reason.setdefault(str(reasons[0] or "the tier does not know it"), []).append(column.heading)
-    return [(", ".join(names), reason) for reason, names in by_reason.items()]
+    for column in _ERROR_NUMBERS[_FIRST_ERROR:]:
+        if sizes and all(size.get(column.key) is None for size in sizes):
+            reason = sizes[0].get("reasons", {}).get(column.key)
+            by_reason.setdefault(str(reason or "this tier does not know it"), []).append(column.heading)
+    return [("; ".join(names), reason) for reason, names in by_reason.items()]
 
 
 def _error_rows(entry: Mapping[str, Any]) -> Iterator[tuple[Value, ...]]:
     best = entry.get("recommended_sector_deg")
     for size in entry["sizes"]:
-        known = {**size, "lidar": entry.get("lidar"), **{key: entry.get(key) for key in ("scan", "target", "tier", "reference")}}
+        known = {
+            **size,
+            "lidar": entry.get("lidar"),
+            **{key: entry.get(key) for key in ("scan", "target", "tier", "reference")},
+        }
         known["recommended"] = "yes" if best is not None and size.get("sector_deg") == best else "no"
         yield tuple(known.get(column.key) for column in ERRORS)
 

@@ -1,4 +1,4 @@
-"""Tables of the report: each column once, for the page (sensible digits) and for the CSV file beside it (all of them)."""
+"""Tables of the report: each column once, for the page (sensible digits) and for CSV (all of them)."""
 
 import csv
 import math
@@ -12,7 +12,7 @@ DASH = "–"  # on the page, where nothing is known; a CSV cell stays empty
 MINUS = "−"
 CSV_DIGITS = 10  # significant: a tenth of a millimetre in ten thousand kilometres
 
-# A spreadsheet takes text that begins so for a formula: it gets an apostrophe in front. Names come from others.
+# A spreadsheet takes text that begins so for a formula: it gets an apostrophe in front.
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
@@ -25,6 +25,7 @@ class Column(NamedTuple):
     digits: int | None = None  # after the decimal point; None for text
     signed: bool = False  # write the plus sign
     on_page: bool = True
+    in_file: bool = True
 
     @property
     def numeric(self) -> bool:
@@ -50,6 +51,19 @@ class Table(NamedTuple):
         """The cells of the page, as text."""
         return [
             [cell(column, value) for column, value in zip(self.columns, row, strict=True) if column.on_page]
+            for row in self.rows
+        ]
+
+    @property
+    def file_columns(self) -> tuple[Column, ...]:
+        """The columns that stand in the CSV file."""
+        return tuple(column for column in self.columns if column.in_file)
+
+    @property
+    def file_rows(self) -> list[tuple[Value, ...]]:
+        """The values of the CSV file."""
+        return [
+            tuple(value for column, value in zip(self.columns, row, strict=True) if column.in_file)
             for row in self.rows
         ]
 
@@ -85,7 +99,7 @@ def fixed(value: float, digits: int, *, signed: bool = False) -> str:
 
 
 def sensible(value: float | None) -> str:
-    """Write a number of which nothing is known but its size: three digits that count, more only before the point.
+    """Write a number with three digits that count, more only before the point.
 
     Examples
     --------
@@ -129,7 +143,13 @@ def percent(share: float) -> str:
     value = 100 * share
     if value in (0.0, 100.0) or 1 <= value <= 99:
         return f"{value:.0f} %"
-    return f"{value:.2f}".rstrip("0").rstrip(".") + " %" if 0.005 <= value < 99.995 else "< 0.01 %" if value < 1 else "> 99.99 %"
+    return (
+        f"{value:.2f}".rstrip("0").rstrip(".") + " %"
+        if 0.005 <= value < 99.995
+        else "< 0.01 %"
+        if value < 1
+        else "> 99.99 %"
+    )
 
 
 def spans(pairs: Iterable[tuple[float, float]]) -> str:
@@ -151,7 +171,8 @@ def csv_text(columns: Sequence[Column], rows: Iterable[Sequence[Value]]) -> str:
 
     Examples
     --------
-    >>> print(csv_text([Column("name", "name"), Column("gap_m", "gap", "m", 2)], [("=1+1", 0.256), ("a,b", None)]), end="")
+    >>> columns = [Column("name", "name"), Column("gap_m", "gap", "m", 2)]
+    >>> print(csv_text(columns, [("=1+1", 0.256), ("a,b", None)]), end="")
     name,gap_m
     '=1+1,0.256
     "a,b",

@@ -128,7 +128,7 @@ class ScanLayout:
         return float(abs(vertical_mps) * np.tan(np.deg2rad(steepest_deg)))
 
     def edges_deg(self) -> tuple[FloatArray, FloatArray]:
-        """Azimuths and elevations (ray + 2,) that the beam passes through, both ends of its motion included."""
+        """Azimuths and elevations (ray + 2,) that the beam passes through, its motion's ends included."""
         scan = self.scan
         first = scan.azimuth_deg[0] - scan.swept_azimuth_deg[0] / 2
         last = scan.azimuth_deg[-1] + scan.swept_azimuth_deg[-1] / 2
@@ -173,8 +173,9 @@ def lay_out(places: Places, spec: ScanPlan) -> ScanLayout:
     aim = beam_to(places.frame.enu_m(lidar.position, positions.reshape(-1, 3)))
     if (at_head := aim.range_m < LEAST_RANGE_M).any():
         raise InputError(
-            f"scan '{spec.name}': target '{targets[int(np.argmax(at_head))]}' came at {aim.range_m.min():.2f} m from "
-            f"the head of {lidar.name}; allowed are {LEAST_RANGE_M:g} m or more. Check both positions."
+            f"scan '{spec.name}': target '{targets[int(np.argmax(at_head))]}' came at "
+            f"{aim.range_m.min():.2f} m from the head of {lidar.name}; allowed are {LEAST_RANGE_M:g} m or "
+            "more. Check both positions."
         )
     axis = _axis(spec, aim, mounting)
     try:

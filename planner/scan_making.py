@@ -1,7 +1,7 @@
 """From a scan of the site file to its rays and times: one small maker for each type of scan.
 
-Sectors, circles and rasters are swept by a head that keeps its own elevation: on a head that does not stand
-level they rise and fall above the horizon. RHIs and points are declared above the horizon and stay as they are.
+Sectors, circles and rasters are swept by a head that keeps its own elevation: where it does not stand level
+they rise and fall above the horizon. RHIs and points are declared above the horizon and stay as they are.
 """
 
 from dataclasses import replace
@@ -62,7 +62,8 @@ def make_scan(spec: ScanPlan, aim: Beam, axis: Axis, head: HeadLimits, mounting:
     Raises
     ------
     InputError
-        If the numbers do not make a scan: a sector that is no whole number of steps, a raster past the zenith.
+        If the numbers do not make a scan: a sector that is no whole number of steps, a raster past the
+        zenith.
     """
     match spec:
         case SectorScan():

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-from planner.error_curve import ErrorCurve, SizeError
+from planner.error_nouns import ErrorCurve, SizeError
 from planner.site import Tolerance
+from reconstruct.signal import bought_noise, bought_range
 
 
 class Recommendation(NamedTuple):
@@ -11,6 +12,7 @@ class Recommendation(NamedTuple):
 
     sector_deg: float | None
     reason: str
+    saving: str = ""  # what the time that is saved against the widest sector could buy
 
 
 NOT_A_SECTOR = "a pair has no sector size"
@@ -32,16 +34,27 @@ def recommend(curve: ErrorCurve, tolerance: Tolerance) -> Recommendation:
     slope, scatter = widest.values["slope"], widest.values["residual_std_mps"]
     if slope is None or scatter is None:
         return Recommendation(None, NEEDS_TURBULENCE)
-    best = widest
+    best, stopped = widest, "no smaller size was computed"
     for size in curve.sizes[1:]:
         failure = _failure(size, slope, scatter, tolerance)
         if failure:
-            return Recommendation(
-                best.sector_deg, _sentence(best, widest, tolerance) + f"; {size.sector_deg:g}° {failure}"
-            )
+            stopped = f"{size.sector_deg:g}° {failure}"
+            break
         best = size
     return Recommendation(
-        best.sector_deg, _sentence(best, widest, tolerance) + "; no smaller size was computed"
+        best.sector_deg, f"{_sentence(best, widest, tolerance)}; {stopped}", _saving(best, widest)
+    )
+
+
+def _saving(best: SizeError, widest: SizeError) -> str:
+    """What the saved time could buy instead of more scans: longer rays, so less noise or more range."""
+    longer = widest.period_s / best.period_s
+    if longer <= 1.0:
+        return ""
+    reach = bought_range(longer, best.range_m) / best.range_m
+    return (
+        f"at the pace of {widest.sector_deg:g}° its rays could last {longer:.2f} times as long: noise falls to {bought_noise(longer):.0%}, "
+        f"or a weak signal reaches {reach:.2f} times as far at the same noise"
     )
 
 

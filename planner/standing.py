@@ -31,10 +31,22 @@ class Uncertainty(Noun):
     range_m: NonNegative = 5.0
     radial_speed_mps: NonNegative | None = None  # default: the instrument's
     radial_speed_relative: NonNegative = 0.0
+    clock_s: NonNegative = 0.0  # against the other lidars of a pair
     azimuth_correlation: Share = 0.0
     elevation_correlation: Share = 0.0
     range_correlation: Share = 0.0
     radial_speed_correlation: Share = 0.0
+
+
+class Signal(Noun):
+    """How strong the echo is: CNR of one pulse at one range, in the site's air. Noise then follows from range and pulses."""
+
+    cnr_db: Number
+    range_m: Positive
+    pulse_ns: Positive | None = None  # with which it was seen; default: the scan's own
+    extinction_per_m: NonNegative = 1e-4  # clear lowland air, 40 km visibility
+    least_cnr_db: Number = -25.0  # below it a ray is thrown away; the usual filter of the reference study's scanners
+    spread_db: Positive = 3.0  # of the CNR from hour to hour
 
 
 def _instrument_tag(value: object) -> str:
@@ -55,6 +67,7 @@ class Lidar(Noun):
     elevation_offset_deg: Number = 0.0
     mounting: Mounting = Mounting()
     uncertainty: Uncertainty = Uncertainty()
+    signal: Signal | None = None
 
     @property
     def device(self) -> Instrument:
@@ -75,6 +88,8 @@ class Mast(Noun):
     position: Position
     height_m: Positive
     width_m: Positive = 1.0
+    speed_uncertainty_mps: NonNegative | None = None  # of its ten-minute means (k = 1), for the uncertainty budget
+    direction_uncertainty_deg: NonNegative | None = None
 
 
 class Turbine(Noun):

@@ -51,7 +51,9 @@ class Trade:
 Progress = Callable[[float], None]
 
 
-def trades(places: Places, air: Air | None, *, rng: np.random.Generator, progress: Progress | None = None) -> tuple[Trade, ...]:
+def trades(
+    places: Places, air: Air | None, *, rng: np.random.Generator, progress: Progress | None = None
+) -> tuple[Trade, ...]:
     """Measure every trade on a site.
 
     Parameters
@@ -117,7 +119,9 @@ def tier_trades(air: Air, *, rng: np.random.Generator, progress: Progress | None
         If the site declares no turbulence: then every tier is the linear one.
     """
     if air.turbulence is None:
-        raise InputError("the error tiers differ by turbulence, and the site declares none: add wind.turbulence")
+        raise InputError(
+            "the error tiers differ by turbulence, and the site declares none: add wind.turbulence"
+        )
     state, eddies = air.states[len(air.states) // 2], air.turbulence
     noise = np.array([each.radial_speed_mps for each in air.sources])[air.rays.lidar]
     runs = [_run(air, Settings(realisations=count), rng) for count in REALISATIONS]
@@ -136,7 +140,14 @@ def tier_trades(air: Air, *, rng: np.random.Generator, progress: Progress | None
     for count, (time_s, verdict) in zip(REALISATIONS, runs, strict=True):
         last = count == REALISATIONS[-1]
         error = None if last else abs(verdict.speed_std_mps.value - truth.value)
-        yield Trade("error tier", f"monte-carlo, {count} periods", time_s, error, "m/s", verdict.speed_std_mps.standard_error)
+        yield Trade(
+            "error tier",
+            f"monte-carlo, {count} periods",
+            time_s,
+            error,
+            "m/s",
+            verdict.speed_std_mps.standard_error,
+        )
     yield from _probe_trades(air, rng)
     _tell(progress, 1.0)
 
@@ -158,7 +169,9 @@ def _run(air: Air, settings: Settings, rng: np.random.Generator) -> tuple[float,
     state = air.states[len(air.states) // 2]
     start = perf_counter()
     verdict = judge(
-        simulate(air.rays, state, rng=rng, sources=tuple(air.sources), turbulence=air.turbulence, settings=settings)
+        simulate(
+            air.rays, state, rng=rng, sources=tuple(air.sources), turbulence=air.turbulence, settings=settings
+        )
     )
     return perf_counter() - start, verdict
 

@@ -1,4 +1,4 @@
-"""The site's wind at a target, as states with weights, and each lidar's errors: what the reconstruction wants."""
+"""The site's wind at a target as states with weights, and each lidar's errors, for the reconstruction."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from geometry.errors import InputError
 from planner.exclusion import wanted_directions
 from planner.site import Lidar, Site
 from planner.wind_rose import load_rose
-from reconstruct.climate import Climate, listed_climate, rose_climate, weibull_climate
+from reconstruct.climate import DIRECTIONS, SPEEDS, Climate, listed_climate, rose_climate, weibull_climate
 from reconstruct.spectra import Turbulence
 from reconstruct.uncertainty import ErrorSources
 from reconstruct.wind import WindState
@@ -22,10 +22,26 @@ ROSE_SPEEDS = 5
 GUST_STDS = 3.0  # standard deviations of a gust above the mean
 
 
-def climate_at(site: Site, target: str, excluded: SectorSet) -> Climate:
+def climate_at(
+    site: Site,
+    target: str,
+    excluded: SectorSet,
+    *,
+    speeds: int = SPEEDS,
+    directions: int = DIRECTIONS,
+) -> Climate:
     """States of the wind at a target: declared directions, else all less the excluded ones.
 
     Speeds are carried from the reference height to the target's by the site's power law.
+
+    Parameters
+    ----------
+    site, target
+        The site and the name of the target.
+    excluded
+        Directions that wakes disturb [deg].
+    speeds, directions
+        Number of speeds and directions; a rose and listed speeds keep their own.
 
     Raises
     ------
@@ -37,11 +53,12 @@ def climate_at(site: Site, target: str, excluded: SectorSet) -> Climate:
     wanted = wanted_directions(site) if declared else excluded.complement()
     if not wanted.sectors:
         raise InputError(
-            "no wind direction is free of wakes: give wind.directions_deg, the directions that count all the same"
+            "no wind direction is free of wakes: give wind.directions_deg, the directions that count all "
+            "the same"
         )
     low_mps, high_mps = wind.speed_range_mps
     growth = _growth(site, target)
-    directions = [(start, stop) if start != stop else (0.0, 360.0) for start, stop in wanted.pairs()]
+    sectors = [(start, stop) if start != stop else (0.0, 360.0) for start, stop in wanted.pairs()]
     if wind.rose is not None:
         at_reference = _from_rose(site, wanted)
     elif wind.weibull is not None:
@@ -49,12 +66,16 @@ def climate_at(site: Site, target: str, excluded: SectorSet) -> Climate:
             wind.weibull.scale_mps,
             wind.weibull.shape,
             speed_range_mps=(low_mps, high_mps),
-            directions_deg=directions,
+            directions_deg=sectors,
+            speeds=speeds,
+            directions=directions,
         )
     elif wind.speeds_mps is not None:
-        at_reference = listed_climate(wind.speeds_mps, directions_deg=directions)
+        at_reference = listed_climate(wind.speeds_mps, directions_deg=sectors, directions=directions)
     else:
-        at_reference = listed_climate(np.linspace(low_mps, high_mps, RANGE_SPEEDS), directions_deg=directions)
+        at_reference = listed_climate(
+            np.linspace(low_mps, high_mps, speeds), directions_deg=sectors, directions=directions
+        )
     return Climate(at_reference.speed_mps * growth, at_reference.from_deg, at_reference.weight)
 
 
@@ -82,8 +103,8 @@ def height_above_ground_m(site: Site, target: str) -> float:
     height_m = site.target_position_m(target)[2] - site.ground_m
     if height_m <= 0:
         raise InputError(
-            f"target {target} is {height_m:.1f} m above the ground at {site.ground_m:g} m; wind needs a target above it: "
-            "check its height and ground_height_m"
+            f"target {target} is {height_m:.1f} m above the ground at {site.ground_m:g} m; wind needs a "
+            "target above it: check its height and ground_height_m"
         )
     return height_m
 
@@ -122,11 +143,11 @@ def turbulence(site: Site) -> Turbulence | None:
     return Turbulence(declared.intensity, declared.length_m, declared.model)
 
 
-def error_sources(lidar: Lidar) -> ErrorSources:
-    """What can be wrong with a lidar, as standard deviations."""
+def error_sources(lidar: Lidar, noise_mps: float) -> ErrorSources:
+    """What can be wrong with a lidar, as standard deviations; the noise depends on the scan."""
     unsure = lidar.uncertainty
     return ErrorSources(
-        radial_speed_mps=lidar.radial_speed_noise_mps,
+        radial_speed_mps=noise_mps,
         azimuth_deg=unsure.azimuth_deg,
         elevation_deg=unsure.elevation_deg,
         range_m=unsure.range_m,
@@ -134,6 +155,7 @@ def error_sources(lidar: Lidar) -> ErrorSources:
         heading_deg=unsure.heading_deg,
         levelling_deg=unsure.levelling_deg,
         position_m=unsure.position_m,
+        clock_s=unsure.clock_s,
         radial_speed_correlation=unsure.radial_speed_correlation,
         azimuth_correlation=unsure.azimuth_correlation,
         elevation_correlation=unsure.elevation_correlation,
@@ -150,7 +172,7 @@ def _growth(site: Site, target: str) -> float:
 
 
 def _from_rose(site: Site, wanted: SectorSet) -> Climate:
-    """States of a measured rose: its sectors cut into pieces, each with the speeds of its own distribution."""
+    """States of a measured rose: its sectors cut into pieces, each with its own distribution of speeds."""
     wind = site.assumed_wind
     if wind.rose is None:
         raise InputError("the site has no wind rose")
@@ -171,7 +193,7 @@ def _from_rose(site: Site, wanted: SectorSet) -> Climate:
 
 
 def _sector_speeds(site: Site, number: int) -> tuple[FloatArray, FloatArray]:
-    """Speeds and weights of one sector of the rose: its Weibull distribution, else the site's speed range alike."""
+    """Speeds and weights of one sector of the rose: by its Weibull, else the site's speed range alike."""
     wind = site.assumed_wind
     rose = load_rose(wind.rose) if wind.rose is not None else None
     if rose is None or rose.weibull_scale_mps is None or rose.weibull_shape is None:

@@ -35,19 +35,26 @@ class Rose:
 
 
 def share_within(site: Site, directions: SectorSet) -> float:
-    """Share of the wind that comes from some directions: by the site's rose, else uniform; 0 to 1."""
+    """Share of the wind that comes from some directions: by the site's rose, else uniform; 0 to 1.
+
+    Examples
+    --------
+    >>> site = Site(name="Moor", crs="EPSG:32632")
+    >>> round(share_within(site, SectorSet.of([Sector.between(350.0, 26.0)])), 3)
+    0.1
+    """
     if site.wind is None or site.wind.rose is None:
         return directions.width_deg / FULL_CIRCLE_DEG
     rose = load_rose(site.wind.rose)
     inside = [
-        directions.intersection(SectorSet.of([sector])).width_deg / sector.width_deg for sector in rose.sectors
+        directions.intersection(SectorSet.of([sector])).width_deg / sector.width_deg
+        for sector in rose.sectors
     ]
     return float(np.dot(inside, rose.share))
 
 
-@lru_cache(maxsize=8)
 def load_rose(path: Path) -> Rose:
-    """Read a wind rose.
+    """Read a wind rose; a file that has not changed is read once.
 
     Parameters
     ----------
@@ -66,12 +73,22 @@ def load_rose(path: Path) -> Rose:
         If the file cannot be read, a column is missing, the directions are not equal sectors around the whole
         circle, or a number is negative or missing.
     """
+    try:
+        state = path.stat()
+        return _read_rose(path, state.st_mtime_ns, state.st_size)
+    except OSError as error:
+        raise _unreadable(path, error) from error
+
+
+@lru_cache(maxsize=8)
+def _read_rose(path: Path, _changed_ns: int, _size: int) -> Rose:
+    """Read and check a rose; when it was changed last is part of what it is known by."""
     import pandas as pd
 
     try:
         table = pd.read_csv(path, skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        raise InputError(f"wind rose {path} cannot be read ({error}); it has to be a CSV of {COLUMNS}") from error
+    except ValueError as error:
+        raise _unreadable(path, error) from error
     _check_columns(path, list(map(str, table.columns)))
     try:
         table = table.astype(float).sort_values("direction_deg")
@@ -82,6 +99,10 @@ def load_rose(path: Path) -> Rose:
     _check_directions(path, directions)
     _check_numbers(path, share, scale_mps, shape)
     return Rose(directions, share / share.sum(), scale_mps, shape)
+
+
+def _unreadable(path: Path, error: Exception) -> InputError:
+    return InputError(f"wind rose {path} cannot be read ({error}); it has to be a CSV of {COLUMNS}")
 
 
 def _check_columns(path: Path, columns: list[str]) -> None:
@@ -114,7 +135,9 @@ def _check_numbers(
         )
     for name, values in zip(WEIBULL_COLUMNS, (scale_mps, shape), strict=True):
         if values is not None and not (np.isfinite(values).all() and (values > 0).all()):
-            raise InputError(f"wind rose {path}: {name} {values.tolist()} has to be a number above 0 everywhere")
+            raise InputError(
+                f"wind rose {path}: {name} {values.tolist()} has to be a number above 0 everywhere"
+            )
 
 
 def prevailing_deg(site: Site, wanted: SectorSet) -> float:
@@ -132,6 +155,12 @@ def prevailing_deg(site: Site, wanted: SectorSet) -> float:
     float
         Mean direction, weighted by frequency [deg]; NaN where the wind comes from everywhere alike, or from
         nowhere.
+
+    Examples
+    --------
+    >>> site = Site(name="Moor", crs="EPSG:32632")
+    >>> round(prevailing_deg(site, SectorSet.of([Sector.between(118.0, 270.0)])), 1)
+    194.0
     """
     middles = np.arange(0.5, FULL_CIRCLE_DEG)
     cells = [SectorSet.of([Sector(float(middle) - 0.5, 1.0)]).intersection(wanted) for middle in middles]

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
+from reconstruct.sheared import sheared
 from reconstruct.spectra import (
     COHERENCE_DECAY,
     COHERENCE_OFFSET,
@@ -29,7 +30,7 @@ _NEAR_ZERO = 1e-300
 class Correlation(Protocol):
     """Correlation of two wind components at two places."""
 
-    def __call__(self, separation_m: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+    def __call__(self, separation_m: FloatArray, first: FloatArray, second: FloatArray, /) -> FloatArray:
         """Covariance of first · wind and second · wind, the first place being at `separation_m` from the
         second.
 
@@ -63,8 +64,6 @@ def correlation(turbulence: Turbulence) -> Correlation:
         return isotropic(turbulence.eddy_length_m)
     if turbulence.model == "kaimal":
         return coherent(turbulence.kaimal_length_m)
-    from reconstruct.sheared import sheared
-
     return sheared(turbulence.gamma, turbulence.mann_length_m)
 
 
@@ -74,7 +73,7 @@ def karman_longitudinal(distance: FloatArray) -> FloatArray:
     Notes
     -----
     f(x) = 2^(2/3)/Gamma(1/3) x^(1/3) K_(1/3)(x); its integral over r is L = l/1.339. Mann (1994), J. Fluid
-    Mech. 273, 141-168, doi:10.1017/S0022112094001886, equation 2.16 is its spectrum.
+    Mech. 273, 141-168, doi:10.1017/S0022112094001886 gives its spectrum.
 
     Examples
     --------
@@ -93,7 +92,7 @@ def karman_excess(distance: FloatArray) -> FloatArray:
 
     Notes
     -----
-    From incompressibility, g = f + (r/2) f' (Batchelor 1953, equation 3.4.5), and (x^n K_n)' = -x^n K_(n-1).
+    From incompressibility, g = f + (r/2) f' (Batchelor 1953, section 3.4), and (x^n K_n)' = -x^n K_(n-1).
 
     Examples
     --------
@@ -118,7 +117,7 @@ def _karman_table() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
 
 @lru_cache(maxsize=64)
 def isotropic(eddy_length_m: float) -> Correlation:
-    """Isotropic von Kármán turbulence: R_ij = (f - g) r_i r_j / r² + g delta_ij (Batchelor 1953, 3.4.3)."""
+    """Isotropic von Kármán turbulence: R_ij = (f - g) r_i r_j / r² + g delta_ij (Batchelor 1953)."""
     lateral, lateral_step, excess, excess_step = _karman_table()
     per_root_m = TABLE_POINTS / TABLE_END / math.sqrt(eddy_length_m)
 
@@ -152,8 +151,8 @@ def coherent(kaimal_length_m: float) -> Correlation:
 
     Notes
     -----
-    Coh(d, n) = exp(-12 sqrt((n d/V)² + (0.12 d/L_c)²)) (IEC 61400-1 ed. 4, equation C.5), L_c the
-    longitudinal length (Table C.1); its in-phase cross-spectrum, frozen, gives R(x, d) = integral of S(k) Coh
+    Coh(d, n) = exp(-12 sqrt((n d/V)² + (0.12 d/L_c)²)) (IEC 61400-1 ed. 4, Annex C), L_c the
+    longitudinal length; its in-phase cross-spectrum, frozen, gives R(x, d) = integral of S(k) Coh
     cos(2 pi k x) dk.
     """
     tables = _coherent_tables()

@@ -23,6 +23,10 @@ REORTHOGONALISE = 0.5
 """A column that keeps more than this of its length is orthogonal to rounding after one pass."""
 
 
+_TINY = 1e-300
+"""Divisor in place of 0: what it divides is 0 too."""
+
+
 class Factor(NamedTuple):
     """Weighted rows W A T = Q R of one or many scans, T being the turn to the principal axis of the beams."""
 
@@ -173,7 +177,7 @@ def _normalise(column: FloatArray) -> FloatArray:
     one.
     """
     length = np.sqrt(dot(column, column))
-    column /= np.where(length > 0, length, 1.0)
+    column *= 1 / np.maximum(length, _TINY)
     return length
 
 
@@ -181,12 +185,16 @@ def _half_angle(sine: FloatArray, cosine: FloatArray) -> FloatArray:
     """(2, ...) sine and cosine of half the angle of a vector of any length: tan(a/2) = sin a / (1 + cos
     a).
     """
-    far = np.sqrt(sine * sine + cosine * cosine) + np.abs(cosine)
-    small = sine / np.where(far > 0, far, 1.0)
+    small = np.sqrt(sine * sine + cosine * cosine)
+    small += np.abs(cosine)
+    np.divide(sine, np.maximum(small, _TINY), out=small)
     large = 1 / np.sqrt(1 + small * small)
-    small = small * large
-    near = cosine >= 0
-    return np.stack([np.where(near, small, large), np.where(near, large, small)])
+    small *= large
+    near, out = cosine >= 0, np.empty((2, *small.shape))
+    out[0], out[1] = large, small
+    np.copyto(out[0], small, where=near)
+    np.copyto(out[1], large, where=near)
+    return out
 
 
 def _turn_back(inverse: FloatArray, axis: FloatArray) -> FloatArray:

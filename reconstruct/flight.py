@@ -6,6 +6,7 @@ U t.
 """
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -164,32 +165,67 @@ def reach_m(rays: Rays, wind: WindState, duration_s: float) -> FloatArray:
     return np.asarray(np.ptp(places, axis=0) + np.abs(carried_mps(wind)) * duration_s)
 
 
-def subgrid_std(rays: Rays, wind: WindState, turbulence: Turbulence, field: Field) -> FloatArray:
-    """Share (ray,) of the standard deviation that eddies smaller than the cells leave in each ray's radial
-    speed.
+def subgrid_root(rays: Rays, wind: WindState, turbulence: Turbulence, cut_per_m: float) -> FloatArray:
+    """Matrix (ray, ray) that makes of independent normal numbers what small eddies add to the rays.
 
+    Parameters
+    ----------
+    rays : Rays
+        The scan as planned.
+    wind : WindState
+        Mean wind.
+    turbulence : Turbulence
+        Model and length.
+    cut_per_m : float
+        Largest wavenumber that the field has [rad/m].
+
+    Returns
+    -------
+    numpy.ndarray
+        Root of their covariance in the radial speeds, for a longitudinal variance of 1.
+
+    Notes
+    -----
     The average over the probe leaves of a wave what `Probe.transfer` says of its wavenumber along the beam;
     the ray's way through the air (its own sweep, and the wind that passes meanwhile) leaves sin(x)/x, with x
-    half the phase that the wave turns on that way.
+    half the phase that the wave turns on that way. Rays of different lidars that cross share small eddies;
+    those of one lidar, which follow each other in place and time, are taken as independent.
     """
     beam = beams(rays.azimuth_deg, rays.elevation_deg, wind.from_deg)
+    way = _way_m(rays, wind, beam)
+    place = to_wind_frame(rays.centre_m, wind.from_deg) - rays.time_s[:, None] * carried_mps(wind)
+    covariance = np.zeros((rays.count, rays.count))
+
+    def left(ray: int, wavevector: FloatArray) -> FloatArray:
+        along, passing = (np.tensordot(vector[ray], wavevector, axes=1) for vector in (beam, way))
+        return np.asarray(rays.probes[int(rays.lidar[ray])].transfer(along) * np.sinc(passing / (2 * np.pi)))
+
+    for one, other in combinations_with_replacement(range(rays.count), 2):
+        if one != other and not _meet(rays, place, one, other):
+            continue
+        gap = place[one] - place[other]
+
+        def shared(k: FloatArray, one: int = one, other: int = other, gap: FloatArray = gap) -> FloatArray:
+            return np.asarray(left(one, k) * left(other, k) * np.cos(np.tensordot(gap, k, axes=1)))
+
+        small = subgrid_covariance(turbulence, cut_per_m, response=shared, axis=beam[one])
+        covariance[one, other] = covariance[other, one] = beam[one] @ small @ beam[other]
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _meet(rays: Rays, place_m: FloatArray, one: int, other: int) -> bool:
+    """Whether rays of different lidars may share small eddies: gates within a probe in the moving air."""
+    lidars = int(rays.lidar[one]), int(rays.lidar[other])
+    reach = max(rays.probes[lidar].length_m for lidar in lidars)
+    return lidars[0] != lidars[1] and float(np.linalg.norm(place_m[one] - place_m[other])) < reach
+
+
+def _way_m(rays: Rays, wind: WindState, beam: FloatArray) -> FloatArray:
+    """(ray, 3) way of each gate through the moving air during its ray [m]."""
     turn = np.radians(rays.swept_azimuth_deg)[:, None]
-    sideways = np.stack(
-        [beam[:, 1], -beam[:, 0], np.zeros(rays.count)], axis=-1
-    )  # clockwise, length cos(elevation)
-    way = rays.range_m[:, None] * turn * sideways - rays.duration_s[:, None] * carried_mps(wind)
-    share = np.empty(rays.count)
-    for ray in range(rays.count):
-
-        def left(wavevector: FloatArray, ray: int = ray) -> FloatArray:
-            along = np.tensordot(beam[ray], wavevector, axes=1)
-            passing = np.tensordot(way[ray], wavevector, axes=1)
-            probe = rays.probes[int(rays.lidar[ray])]
-            return np.asarray(probe.transfer(along) * np.sinc(passing / (2 * np.pi)))
-
-        small = subgrid_covariance(turbulence, field.cut_per_m, response=left, axis=beam[ray])
-        share[ray] = beam[ray] @ small @ beam[ray]
-    return np.sqrt(share)
+    sideways = np.stack([beam[:, 1], -beam[:, 0], np.zeros(rays.count)], axis=-1)  # clockwise
+    return np.asarray(rays.range_m[:, None] * turn * sideways - rays.duration_s[:, None] * carried_mps(wind))
 
 
 class _Sight(NamedTuple):

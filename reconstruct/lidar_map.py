@@ -105,13 +105,12 @@ def _pair_chunk(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     speed = points[3]
     with np.errstate(invalid="ignore", divide="ignore"):
-        views = [_view(head, points, wind) for head in heads]
-        noise = np.stack([_variance(view, source) for view, source in zip(views, sources, strict=True)])
+        views = [beam_view(head, points, wind) for head in heads]
+        noise = np.stack([radial_variance_m2s2(view, source) for view, source in zip(views, sources, strict=True)])
     rows = np.array([[view.east for view in views], [view.north for view in views]])
-    root = np.ones_like(rows[0])
-    missing = ~np.isfinite(rows[0])
-    if np.any(missing):  # a target at a lidar
-        rows[:, missing], root[missing] = 0.0, 0.0
+    root = np.isfinite(rows[0]).astype(float)
+    if not np.all(root):  # a target at a lidar, or right above it
+        rows[:, root == 0] = 0.0
     columns, axis = turn(list(rows), root)
     factor = factorise(columns, root, axis)
     along = np.stack(uv_mps(1.0, wind.from_deg))
@@ -130,7 +129,8 @@ def _carried(basis: tuple[FloatArray, ...], spread: FloatArray, direction: Float
     return np.asarray(small[0] * basis[0] + small[1] * basis[1])
 
 
-def _view(head: FloatArray, points: list[FloatArray], wind: WindState) -> responses.View:
+def beam_view(head: FloatArray, points: Sequence[FloatArray], wind: WindState) -> responses.View:
+    """Beams from a head (3, ...) to points: east, north, up [m], speed [m/s] and shear [1/s] there, which broadcast."""
     east, north, up = (points[i] - head[i] for i in range(3))
     level2 = east * east + north * north
     level, distance = np.sqrt(level2), np.sqrt(level2 + up * up)
@@ -154,7 +154,7 @@ def _view(head: FloatArray, points: list[FloatArray], wind: WindState) -> respon
     )
 
 
-def _variance(view: responses.View, sources: ErrorSources) -> FloatArray:
+def radial_variance_m2s2(view: responses.View, sources: ErrorSources) -> FloatArray:
     """Variance of the radial speed at each target [m²/s²]; with one ray a lidar, correlation has nothing to
     do.
     """

@@ -16,11 +16,14 @@ NARROW = 0.05
 """Up to this ratio of error to wind the Gauss-Hermite product rule is exact to rounding (tested)."""
 
 HERMITE_NODES = 12
-LEGENDRE_NODES = 48
-FLATTEST = 1e-4
+LEGENDRE_NODES = 80
+FLATTEST = 1e-8
 """The short axis of the error is taken as at least this share of the long one or of the wind: it keeps the
 scaled angle finite.
 """
+
+LOST = 1e-12
+"""A mean unit vector shorter than this is the rounding of the sum that made it: no direction is known."""
 
 CHUNK = 4096
 """Wind states that are integrated over the angle at once: some tens of megabytes."""
@@ -31,8 +34,8 @@ class WindMoments(NamedTuple):
 
     speed_bias_mps: FloatArray
     speed_std_mps: FloatArray
-    direction_bias_deg: FloatArray  # circular mean of the difference; NaN in a calm
-    direction_std_deg: FloatArray  # root mean square of the wrapped difference from that mean; NaN in a calm
+    direction_bias_deg: FloatArray  # circular mean of the difference; NaN in a calm, or drowned by the error
+    direction_std_deg: FloatArray  # root mean square of the wrapped difference from that mean; NaN as the mean
 
 
 def wind_moments(
@@ -154,7 +157,9 @@ def _wide(truth: FloatArray, mean: FloatArray, std: FloatArray) -> FloatArray:
     first = np.sum(weight * length * density[1], -1) / total
     second = np.sum(std**2 + mean**2, -1)
     turn = direction - turn0[:, None]
-    bias = np.arctan2(np.sum(weight * np.sin(turn), -1), np.sum(weight * np.cos(turn), -1))
+    across, ahead = np.sum(weight * np.sin(turn), -1), np.sum(weight * np.cos(turn), -1)
+    bias = np.arctan2(across, ahead)
+    bias[np.hypot(across, ahead) <= LOST * total] = np.nan
     spread = _angular_std(edges, turn0 + bias, scaled, std)
     speed_std = np.sqrt(np.clip(second - first**2, 0.0, None))
     return np.stack([first - np.hypot(*truth.T), speed_std, -np.degrees(bias), np.degrees(spread)])

@@ -24,7 +24,7 @@ from reconstruct.flight import (
     radial_speed_mps,
     reach_m,
     reference_mps,
-    subgrid_std,
+    subgrid_root,
     uniform_radial_speed_mps,
 )
 from reconstruct.rays import Rays
@@ -132,8 +132,8 @@ def simulate_scenes(
     Notes
     -----
     The field passes at the speed of the wind at the target, whatever the shear (Taylor's hypothesis). Eddies
-    smaller than the field's cells are noise, independent from ray to ray and from sample to sample, whose
-    variance is what the ray's own averaging leaves of them (`flight.subgrid_std`).
+    smaller than the field's cells are noise, independent from scan to scan and from sample to sample, whose
+    covariance is what the rays' own averaging leaves of them (`flight.subgrid_root`).
     """
     sources = ErrorSources() if sources is None else sources
     _check(scenes, settings)
@@ -217,7 +217,7 @@ def _with_turbulence(
     subgrid: list[FloatArray] = []
     for number in range(fields):
         field = synthesise(turbulence, extent, rng=rng, spacing_m=settings.spacing_m)
-        subgrid = subgrid or [subgrid_std(rays, wind, turbulence, field) for rays, wind in scenes]
+        subgrid = subgrid or [subgrid_root(*scene, turbulence, field.cut_per_m) for scene in scenes]
         shifts = spread_shifts_m(field, int(np.count_nonzero(block == number)), rng)
         for index, scene in enumerate(scenes):
             air = Air(field, turbulence.std_mps(scene.wind.speed_mps), subgrid[index])
@@ -242,7 +242,7 @@ class Air(NamedTuple):
 
     field: Field
     std_mps: float  # of the downwind component
-    subgrid_std: FloatArray  # (ray,) of each ray, that the field lacks, over the standard deviation downwind
+    subgrid_root: FloatArray  # (ray, ray) of what the field lacks in the rays, from `flight.subgrid_root`
 
 
 def spread_shifts_m(field: Field, flights: int, rng: np.random.Generator) -> FloatArray:
@@ -299,7 +299,7 @@ def fly_through(
             std_mps=air.std_mps,
             shift_m=shift,
         )
-        clean += air.std_mps * air.subgrid_std * rng.standard_normal(clean.shape)
+        clean += air.std_mps * rng.standard_normal(clean.shape) @ air.subgrid_root.T
         found.append(retrieval.solve(rows, _measured(clean, sources, rays, (1, scans), rng)[0]).wind_mps)
         met.append(_reference_uv_mps(wind, air, shift, settings.averaging_s, rng))
     return Simulation(

@@ -40,7 +40,9 @@ def dual_doppler_wind(
     >>> dual_doppler_wind([0.0, 90.0], 0.0, [3.0, 4.0]).wind_mps.round(6) + 0.0
     array([4., 3.])
     """
-    _, elevation = np.broadcast_arrays(np.asarray(azimuth_deg), np.radians(elevation_deg))
+    _, elevation = np.broadcast_arrays(
+        np.asarray(azimuth_deg), np.radians(np.asarray(elevation_deg, dtype=float))
+    )
     lifted = np.asarray(vertical_mps, dtype=float)[..., None] * np.sin(elevation)
     speed = np.asarray(radial_speed_mps, dtype=float) - lifted
     return solve(rows(azimuth_deg, elevation_deg), speed, weights=weights)

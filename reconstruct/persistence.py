@@ -19,13 +19,13 @@ from reconstruct.wind import WindState
 class SplitCovariance(NamedTuple):
     """Covariance of the errors of the radial speeds [m²/s²], in two parts."""
 
-    random_m2s2: FloatArray  # (ray, ray) diagonal: new in every scan
+    random_m2s2: FloatArray  # (ray,) variance: new in every ray of every scan
     persistent_m2s2: FloatArray  # (ray, ray) the same in every scan
 
     @property
     def total_m2s2(self) -> FloatArray:
         """(ray, ray) of one scan among many campaigns."""
-        return self.random_m2s2 + self.persistent_m2s2
+        return np.diag(self.random_m2s2) + self.persistent_m2s2
 
 
 def split_covariance(
@@ -61,15 +61,23 @@ def split_covariance(
     ...     swept_azimuth_deg=np.zeros(2), probes=(Probe(pulse_ns=200, window_ns=256),), period_s=1.0)
     >>> sources = ErrorSources(radial_speed_mps=0.1, heading_deg=0.1)
     >>> parts = split_covariance(rays, WindState(10.0, 270.0), sources)
-    >>> parts.random_m2s2.round(4) + 0.0, parts.persistent_m2s2.round(4) + 0.0
-    (array([[0.01, 0.  ],
-           [0.  , 0.01]]), array([[0.0003, 0.    ],
+    >>> parts.random_m2s2.round(4), parts.persistent_m2s2.round(4) + 0.0
+    (array([0.01, 0.01]), array([[0.0003, 0.    ],
            [0.    , 0.    ]]))
     """
     together = rays.lidar[:, None] == rays.lidar
-    random, persistent = np.zeros((2, rays.count, rays.count))
+    persistent = np.zeros((rays.count, rays.count))
     for error in ray_errors(rays, wind, sources):
         shared = error.response_mps * np.sqrt(error.correlation)
-        random += np.diag(error.response_mps**2 - shared**2)
         persistent += together * np.outer(shared, shared)
-    return SplitCovariance(random, persistent)
+    return SplitCovariance(random_variance(rays, wind, sources), persistent)
+
+
+def random_variance(
+    rays: Rays, wind: WindState, sources: ErrorSources | Sequence[ErrorSources]
+) -> FloatArray:
+    """Variance (ray,) of the errors that are new in every ray [m²/s²]; see `split_covariance`."""
+    out = np.zeros(rays.count)
+    for error in ray_errors(rays, wind, sources):
+        out += error.response_mps**2 * (1 - error.correlation)
+    return out

@@ -21,6 +21,7 @@ Tier = Literal["noise", "linear", "turbulent", "monte-carlo"]
 NEEDS_TURBULENCE = "needs the turbulent or the Monte Carlo tier: this one has no eddies"
 RANK_SHORT = "the rays cannot tell the components of the wind apart"
 CALM = "a calm has no direction"
+DROWNED = "the error drowns the wind: no direction is likelier than another"
 BELOW_GROUND = "the power law has no wind at or below the ground, and a gate lies there"
 
 TEN_MINUTE_FIELDS = ("mean10_speed_bias_mps", "mean10_speed_std_mps", "mean10_direction_std_deg")
@@ -86,7 +87,8 @@ def scan_prediction(
     """
     moments = wind_moments(wind.uv_mps, covariance_m2s2, mean_error_mps=mean_error_mps)
     values = {name: float(value) for name, value in zip(WindMoments._fields, moments, strict=True)}
-    why = _why(wind, covariance_m2s2, condition)
+    known = bool(np.all(np.isfinite(covariance_m2s2)) and np.all(np.isfinite(mean_error_mps)))
+    why = _why(wind, condition, known=known)
     lost = {name: why for name, value in values.items() if not np.isfinite(value)}
     return ScanPrediction(
         tier=tier,
@@ -209,7 +211,9 @@ def predict_linear(
     )
 
 
-def _why(wind: WindState, covariance: FloatArray, condition: float) -> str:
+def _why(wind: WindState, condition: float, *, known: bool) -> str:
     if not np.isfinite(condition):
         return RANK_SHORT
-    return CALM if wind.speed_mps == 0 and np.all(np.isfinite(covariance)) else BELOW_GROUND
+    if not known:
+        return BELOW_GROUND
+    return CALM if wind.speed_mps == 0 else DROWNED

@@ -9,6 +9,16 @@ from geometry.beams import unit_vector
 from geometry.errors import InputError
 from geometry.gates import Probe
 
+_FLOATS = (
+    "azimuth_deg",
+    "elevation_deg",
+    "range_m",
+    "head_m",
+    "time_s",
+    "duration_s",
+    "swept_azimuth_deg",
+)
+
 
 @dataclass(frozen=True)
 class Rays:
@@ -20,7 +30,7 @@ class Rays:
     Raises
     ------
     InputError
-        If the arrays do not have one value per ray.
+        If the arrays do not have one finite value per ray, there is no ray, or a lidar has no probe.
 
     Examples
     --------
@@ -48,21 +58,18 @@ class Rays:
     sweep_s: float | None = None  # from the start of the whole pass to its end, rays left out included; default: these rays'
 
     def __post_init__(self) -> None:
-        shapes = {
-            name: np.shape(getattr(self, name))[:1]
-            for name in (
-                "azimuth_deg",
-                "elevation_deg",
-                "range_m",
-                "head_m",
-                "lidar",
-                "time_s",
-                "duration_s",
-                "swept_azimuth_deg",
-            )
-        }
+        shapes = {name: np.shape(getattr(self, name))[:1] for name in (*_FLOATS, "lidar")}
         if len(set(shapes.values())) != 1:
             raise InputError(f"every array of Rays needs one value per ray, but their lengths are {shapes}")
+        if shapes["lidar"] == (0,):
+            raise InputError("Rays came without any ray: give one at least")
+        for name in _FLOATS:  # widened, so that float32 loses nothing more
+            values = np.asarray(getattr(self, name), dtype=float)
+            if not np.all(np.isfinite(values)):
+                raise InputError(
+                    f"{name} of Rays holds a number that is not finite: leave a ray out that is missing"
+                )
+            object.__setattr__(self, name, values)
         if int(np.max(self.lidar)) >= len(self.probes):
             raise InputError(
                 f"Rays name lidar {int(np.max(self.lidar))}, but there are {len(self.probes)} probes: "

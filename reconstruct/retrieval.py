@@ -87,7 +87,10 @@ def rows(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, *, columns: Literal[2
     """
     if columns not in (2, 3):
         raise InputError(f"a fit has 2 columns (u, v) or 3 (u, v, w), not {columns}")
-    azimuth, elevation = np.broadcast_arrays(np.radians(azimuth_deg), np.radians(elevation_deg))
+    # float32 is widened first: its own sines would have seven digits
+    azimuth, elevation = np.broadcast_arrays(
+        *(np.radians(np.asarray(a, dtype=float)) for a in (azimuth_deg, elevation_deg))
+    )
     cosine = np.cos(elevation)
     parts = (np.sin(azimuth) * cosine, np.cos(azimuth) * cosine, np.sin(elevation))
     return np.stack(parts[:columns], axis=-1)

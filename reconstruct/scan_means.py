@@ -99,14 +99,15 @@ def scan_mean(
     vector_mps
         (..., 2) expected vector.
     random, persistent
-        (ray, ray) covariances of the errors drawn anew in each scan, and of those that stay [m²/s²].
+        (..., 1, 2, 2) covariance of the vector from errors drawn anew in each scan, and from those that stay
+        [m²/s²].
     """
     lags = period.lags
     within = lag_covariance(period.rays, period.wind, period.turbulence, lags, sweep=period.sweep)
     between = through(matrix[..., None, :, :], within)  # (..., pass, lag, 2, 2)
-    lasting = np.broadcast_to(through(matrix, persistent), between[..., 0, :, :].shape)
+    lasting = np.broadcast_to(persistent, between[..., 0, :, :].shape)
     between += lasting[..., None, :, :]
-    between[..., 0, :, :] += through(matrix, random)
+    between[..., 0, :, :] += random
     lidar = expand(vector_mps[..., None, :], between[..., 0, :, :])
     values = _speeds_between(lidar, between, lags)
     beyond = speed_covariance(lidar, lidar, lasting)

@@ -7,13 +7,13 @@ interpolated linearly.
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray
-from reconstruct.correlation import Correlation
 from reconstruct.spectra import mann_std_ratio, sheared_tensor, sphere
 
 DEGREE = 24  # highest degree of the harmonics; only even ones occur
@@ -27,7 +27,7 @@ class _Table(NamedTuple):
     values: FloatArray  # (distance, height, turn, component) flattened to (place, component)
 
 
-def sheared(gamma: float, mann_length_m: float) -> Correlation:
+def sheared(gamma: float, mann_length_m: float) -> Callable[[FloatArray, FloatArray, FloatArray], FloatArray]:
     """Correlation of the Mann model, in units of the variance of u.
 
     Notes

@@ -32,16 +32,16 @@ EDDY_LENGTH_RATIO: float = math.gamma(1 / 3) / (math.sqrt(math.pi) * math.gamma(
 # L^2)^(5/6).
 KAIMAL_LENGTH_RATIO: float = ((2 * math.pi * EDDY_LENGTH_RATIO) ** (5 / 3) / 6 ** (5 / 3)) ** 1.5
 MANN_GAMMA = 3.9  # shear distortion parameter, IEC 61400-1 ed. 4, Annex C
-KAIMAL_STD_RATIO = (1.0, 0.8, 0.5)  # of u, v, w to u: IEC 61400-1 ed. 4, Table C.1
+KAIMAL_STD_RATIO = (1.0, 0.8, 0.5)  # of u, v, w to u: IEC 61400-1 ed. 4, Annex C
 KAIMAL_LENGTH_FACTOR = (1.0, 2.7 / 8.1, 0.66 / 8.1)  # same table: 8.1, 2.7 and 0.66 times the scale parameter
-COHERENCE_DECAY = 12.0  # IEC 61400-1 ed. 4, equation C.5
+COHERENCE_DECAY = 12.0  # IEC 61400-1 ed. 4, Annex C
 COHERENCE_OFFSET = 0.12
 REFERENCE_INTENSITY: dict[str, float] = {
     "A+": 0.18,
     "A": 0.16,
     "B": 0.14,
     "C": 0.12,
-}  # IEC 61400-1 ed. 4, Table 1
+}  # IEC 61400-1 ed. 4, table of the basic parameters
 
 
 @dataclass(frozen=True)
@@ -141,8 +141,8 @@ def iec_turbulence(
 
     Notes
     -----
-    sigma_1 = I_ref (0.75 V + 5.6 m/s) (IEC 61400-1 ed. 4, equation 10); scale parameter 0.7 z up to 60 m,
-    then 42 m (equation 5), Kaimal length 8.1 times it (Table C.1).
+    IEC 61400-1 ed. 4: sigma_1 = I_ref (0.75 V + 5.6 m/s) (normal turbulence model); scale parameter
+    0.7 z up to 60 m, then 42 m; Kaimal length 8.1 times it (Annex C).
 
     Examples
     --------
@@ -183,8 +183,8 @@ def longitudinal_spectrum(turbulence: Turbulence, frequency_hz: ArrayLike, *, sp
 
     Notes
     -----
-    von Kármán: S = 4 sigma² (L/V) / (1 + 70.8 (n L/V)²)^(5/6) (ESDU 85020, equation A.2.1 with L the integral
-    length); Kaimal: S = 4 sigma² (L_k/V) / (1 + 6 n L_k/V)^(5/3) (IEC 61400-1 ed. 4, equation C.14).
+    von Kármán: S = 4 sigma² (L/V) / (1 + 70.8 (n L/V)²)^(5/6) (ESDU 85020), L the integral
+    length; Kaimal: S = 4 sigma² (L_k/V) / (1 + 6 n L_k/V)^(5/3) (IEC 61400-1 ed. 4, Annex C).
 
     Examples
     --------
@@ -262,7 +262,7 @@ def spectral_tensor(turbulence: Turbulence, wavenumber_per_m: FloatArray) -> Ten
 
 
 def energy_spectrum(k: FloatArray) -> FloatArray:
-    """Von Kármán energy spectrum for l = 1 m and a variance of 1 in each component (Mann 1994, 2.15)."""
+    """Von Kármán energy spectrum for l = 1 m and a variance of 1 in each component (Mann 1994)."""
     integral = math.gamma(5 / 2) * math.gamma(1 / 3) / (2 * math.gamma(17 / 6))  # of k^4/(1+k^2)^(17/6)
     return np.asarray(1.5 / integral * k**4 / (1 + k * k) ** (17 / 6))
 
@@ -272,7 +272,7 @@ def sheared_tensor(gamma: float, k: FloatArray) -> Tensor:
     k1, k2, k3 = np.where(k == 0, 1e-12, k)  # the limits along an axis exist, their formulas divide by zero
     square = k1 * k1 + k2 * k2 + k3 * k3
     beta = gamma * eddy_lifetime(np.sqrt(square)) if gamma else np.zeros_like(square)
-    k30 = k3 + beta * k1  # equation 3.12
+    k30 = k3 + beta * k1
     level = k1 * k1 + k2 * k2
     start = level + k30 * k30
     c1 = beta * k1**2 * (start - 2 * k30**2 + beta * k1 * k30) / (square * level)  # equation 3.16
@@ -292,7 +292,7 @@ def sheared_tensor(gamma: float, k: FloatArray) -> Tensor:
 
 
 def eddy_lifetime(k: FloatArray) -> FloatArray:
-    """Life of an eddy of wavenumber k times the shear, for l = 1 m and gamma 1 (Mann 1994, equation 3.6)."""
+    """Life of an eddy of wavenumber k times the shear, for l = 1 m and gamma 1 (Mann 1994)."""
     return np.asarray(np.exp(np.interp(np.log(k), *_lifetime_table())))
 
 

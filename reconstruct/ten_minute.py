@@ -21,8 +21,17 @@ from reconstruct.joint import expand, speed_covariance
 from reconstruct.moments import WindMoments, wind_moments
 from reconstruct.rays import Rays
 from reconstruct.retrieval import gain, rows
-from reconstruct.scan_means import Period, PointMean, ScanMean, point_mean, scan_mean, scan_with_target
+from reconstruct.scan_means import (
+    Period,
+    PointMean,
+    ScanMean,
+    point_mean,
+    scan_mean,
+    scan_with_target,
+    through,
+)
 from reconstruct.spectra import Turbulence
+from reconstruct.thinning import thinned
 from reconstruct.wind import WindState
 
 Reference = Literal["scalar", "vector"]
@@ -111,7 +120,7 @@ def predict_ten_minute(
         (ray, ray) covariance of the errors drawn anew for every scan [m²/s²]; a number stands for white
         noise.
     persistent_m2s2
-        (ray, ray) covariance of the errors that all scans share [m²/s²].
+        The same for the errors that all scans share [m²/s²], see `persistence.split_covariance`.
     mean_error_mps
         (..., 2) mean error of the retrieved wind, east and north [m/s]: vertical wind, shear, gradients.
     reference
@@ -151,7 +160,9 @@ def predict_ten_minute(
     turn = wind_frame(wind.from_deg)[:2, :2]
     matrix, known = _fits(rays, gains, turn)
     offset = np.asarray(mean_error_mps, dtype=float)
-    random, persistent = (_ray_matrix(value, rays.count) for value in (random_m2s2, persistent_m2s2))
+    random, persistent = (_wind_covariance(matrix, value) for value in (random_m2s2, persistent_m2s2))
+    few, matrix = thinned(rays, matrix)
+    period = period._replace(rays=few)
     lidar = scan_mean(period, matrix, np.array([wind.speed_mps, 0.0]) + offset @ turn.T, random, persistent)
     point = point_mean(period)
     cross, weight = scan_with_target(period, matrix)
@@ -231,9 +242,10 @@ def _fits(rays: Rays, gains: FloatArray | None, turn: FloatArray) -> tuple[Float
     return np.where(known[..., None, None, None], matrix, 0.0), known
 
 
-def _ray_matrix(value: ArrayLike, count: int) -> FloatArray:
-    given = np.asarray(value, dtype=float)
-    return given * np.eye(count) if given.ndim == 0 else given
+def _wind_covariance(matrix: FloatArray, ray_errors_m2s2: ArrayLike) -> FloatArray:
+    """Covariance (..., 1, 2, 2) from errors of the rays: one variance, one a ray, or their covariance."""
+    given = np.asarray(ray_errors_m2s2, dtype=float)
+    return through(matrix, given) if given.ndim == 2 else (matrix * given) @ np.swapaxes(matrix, -1, -2)
 
 
 Moments = tuple[FloatArray, FloatArray, FloatArray]

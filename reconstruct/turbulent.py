@@ -6,18 +6,20 @@ matrix of the same fit: P = G (C_sources + C_turbulence) Gᵀ. At intensity 0 th
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from geometry.arrays import ArrayLike, FloatArray
 from reconstruct.covariance import lag_covariance, point_covariance
-from reconstruct.moments import wind_moments
-from reconstruct.prediction import TEN_MINUTE_FIELDS, ScanPrediction, predict_linear, scan_prediction
+from reconstruct.joint import expand
+from reconstruct.prediction import TEN_MINUTE_FIELDS, ScanPrediction, scan_prediction
 from reconstruct.rays import Rays
-from reconstruct.retrieval import gain, rows
+from reconstruct.retrieval import condition, gain, rows
 from reconstruct.spectra import Turbulence
 from reconstruct.ten_minute import Reference, TenMinute
-from reconstruct.uncertainty import ErrorSources
+from reconstruct.thinning import thinned
+from reconstruct.uncertainty import ErrorSources, mean_errors_mps, wind_covariance_by_source
 from reconstruct.wind import WindState
 
 ONE_SCAN = "of one scan: the ten-minute mean is predicted by predict_ten_minute"
@@ -61,6 +63,7 @@ def turbulence_covariance(
            [0. , 0.3]])
     """
     matrix = gain(rows(rays.azimuth_deg, rays.elevation_deg)) if gains is None else gains
+    rays, matrix = thinned(rays, matrix)
     within = np.mean(lag_covariance(rays, wind, turbulence, sweep=sweep)[:, 0], axis=0)
     return np.asarray(matrix @ within @ np.swapaxes(matrix, -1, -2))
 
@@ -82,7 +85,8 @@ def predict_turbulent(
     rays, wind, turbulence
         The scan and the air.
     sources
-        Errors of the lidars; none without.
+        Errors of the lidars; none without. A clock difference acts here, as eddies pass two beams at
+        different times.
     weights
         (ray,) as the retrieval will use them.
     reference
@@ -115,20 +119,33 @@ def predict_turbulent(
     >>> round(still.speed_std_mps, 3), round(windy.speed_std_mps, 2)
     (0.019, 0.31)
     """
-    linear = predict_linear(rays, wind, sources or ErrorSources(), weights=weights)
-    matrix = gain(rows(rays.azimuth_deg, rays.elevation_deg), weights)
-    eddies = turbulence_covariance(rays, wind, turbulence, gains=matrix, sweep=sweep)
+    matrix = rows(rays.azimuth_deg, rays.elevation_deg)
+    fit = gain(matrix, weights)
+    lidars = wind_covariance_by_source(fit, rays, wind, sources) if sources is not None else {}
+    clocks = _clocks(rays, sources)
+    each = [turbulence_covariance(late, wind, turbulence, gains=fit, sweep=sweep) for late in clocks]
     whole = scan_prediction(
         "turbulent",
         wind,
-        covariance_m2s2=linear.covariance_m2s2 + eddies,
-        mean_error_mps=linear.mean_error_mps,
-        condition=linear.condition,
+        covariance_m2s2=sum(lidars.values(), np.mean(each, axis=0)),
+        mean_error_mps=np.sum(list(mean_errors_mps(fit, rays, wind).values()), axis=0),
+        condition=float(condition(matrix, weights)),
         reasons=dict.fromkeys(TEN_MINUTE_FIELDS, ONE_SCAN),
     )
     if reference == "vector" or whole.speed_bias_mps is None:
         return whole
     return replace(whole, speed_bias_mps=whole.speed_bias_mps - scalar_excess_mps(wind, turbulence))
+
+
+def _clocks(rays: Rays, sources: ErrorSources | Sequence[ErrorSources] | None) -> list[Rays]:
+    """Rays with the clock of each lidar early and late by its standard deviation: two places for each."""
+    lidars = len(rays.probes)
+    each = [sources] * lidars if isinstance(sources, ErrorSources) or sources is None else list(sources)
+    off_s = np.array([0.0 if source is None else source.clock_s for source in each])
+    if lidars == 1 or not np.any(off_s):
+        return [rays]
+    signs = product((-1.0, 1.0), repeat=lidars)
+    return [replace(rays, time_s=rays.time_s + (np.array(sign) * off_s)[rays.lidar]) for sign in signs]
 
 
 def scalar_excess_mps(wind: WindState, turbulence: Turbulence) -> float:
@@ -141,7 +158,8 @@ def scalar_excess_mps(wind: WindState, turbulence: Turbulence) -> float:
     0.032
     """
     variance = point_covariance(wind, turbulence, 0.0)[0]
-    return float(wind_moments([wind.speed_mps, 0.0], np.diag(variance)).speed_bias_mps)
+    speed = expand(np.array([wind.speed_mps, 0.0]), np.diag(variance))
+    return float(speed.mean_mps) - wind.speed_mps
 
 
 def with_ten_minute(prediction: ScanPrediction, mean: TenMinute) -> ScanPrediction:

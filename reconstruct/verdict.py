@@ -4,7 +4,7 @@ The standard errors come from a jackknife over blocks that share nothing: each b
 however many flights went through it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -122,6 +122,107 @@ def judge(simulation: Simulation, *, reference: Reference = "scalar") -> Verdict
     found = {name: _jackknife(statistic, periods, without) for name, statistic in statistics.items()}
     uu, uv, vv = (_jackknife(_covariance_of(i, j), periods, without) for i, j in ((0, 0), (0, 1), (1, 1)))
     return Verdict(**found, covariance_m2s2=(uu, uv, vv))
+
+
+class CampaignVerdict(NamedTuple):
+    """Errors over the states of a climate: mean bias, root-mean-square scatter, and the regression of all periods."""
+
+    speed_bias_mps: Estimate  # of a scan against the mean of the reference
+    speed_std_mps: Estimate
+    direction_bias_deg: Estimate
+    direction_std_deg: Estimate
+    mean10_speed_bias_mps: Estimate
+    mean10_speed_std_mps: Estimate
+    mean10_direction_std_deg: Estimate
+    slope: Estimate
+    residual_std_mps: Estimate
+    direction_residual_std_deg: Estimate  # about the mean bias of all states
+
+
+def judge_campaign(
+    simulations: Sequence[Simulation], weight: FloatArray, *, reference: Reference = "scalar"
+) -> CampaignVerdict:
+    """Reduce simulations of every state of a climate to what a campaign would show, with standard errors.
+
+    Parameters
+    ----------
+    simulations : sequence of Simulation
+        One for each state, through the same fields.
+    weight : numpy.ndarray
+        (state,) how often each state comes.
+    reference : {"scalar", "vector"}
+        As in `judge`.
+
+    Returns
+    -------
+    CampaignVerdict
+        Standard errors by a jackknife that leaves one field out of all states at a time.
+
+    Examples
+    --------
+    >>> wind = WindState(speed_mps=10.0, from_deg=270.0)
+    >>> scans = np.array([[[10.1, 0.0], [9.9, 0.0]], [[10.3, 0.0], [10.1, 0.0]]])
+    >>> still = np.broadcast_to([10.0, 0.0], (2, 1, 2))
+    >>> one = Simulation(wind, scans, still, np.arange(2), condition=1.0)
+    >>> round(judge_campaign([one, one], np.array([0.5, 0.5])).slope.value, 3)
+    0.99
+    """
+    periods = [_periods(simulation, reference) for simulation in simulations]
+    blocks = np.unique(simulations[0].block)
+    names = CampaignVerdict._fields
+    whole = _over_states(periods, weight)
+    without = [
+        _over_states(
+            [
+                _Periods(*(part[simulation.block != block] for part in each))
+                for each, simulation in zip(periods, simulations, strict=True)
+            ],
+            weight,
+        )
+        for block in blocks
+    ]
+    spread = np.array([[parts[name] for name in names] for parts in without])
+    error = np.sqrt((1 - 1 / len(blocks)) * np.sum(np.square(spread - spread.mean(axis=0)), axis=0))
+    known = len(blocks) > 1
+    return CampaignVerdict(
+        *(Estimate(whole[name], float(error[i]) if known else float("nan")) for i, name in enumerate(names))
+    )
+
+
+def _over_states(states: Sequence[_Periods], weight: FloatArray) -> dict[str, float]:
+    """Statistics of a campaign, by name."""
+
+    def mean(values: Iterable[float]) -> float:
+        return float(np.dot(weight, list(values)) / np.sum(weight))
+
+    def scatter(values: Iterable[float]) -> float:
+        return float(np.sqrt(mean(np.square(list(values)))))
+
+    shares = [np.full(len(p.lidar), w / len(p.lidar)) for p, w in zip(states, weight, strict=True)]
+    share = np.concatenate(shares)
+    lidar, mast = (np.concatenate([getattr(p, name) for p in states]) for name in ("lidar", "reference"))
+    turn = np.concatenate([p.turn for p in states])
+    share = np.where(np.isfinite(lidar) & np.isfinite(mast), share, 0.0)
+    lidar, mast = np.nan_to_num(lidar), np.nan_to_num(mast)
+    fitted = float(np.sum(share * mast * lidar) / np.sum(share * lidar**2))
+    residual = mast - fitted * lidar
+    centre = np.sum(share * np.nan_to_num(turn))
+    off = np.degrees(np.angle(np.nan_to_num(turn) * np.conj(centre)))
+    total = float(np.sum(share))
+    return {
+        "speed_bias_mps": mean(_mean(p.scan_speed) - _mean(p.reference) for p in states),
+        "speed_std_mps": scatter(_std(p.scan_speed) for p in states),
+        "direction_bias_deg": mean(_mean_turn(p.scan_turn.ravel()) for p in states),
+        "direction_std_deg": scatter(_std_turn(p.scan_turn.ravel()) for p in states),
+        "mean10_speed_bias_mps": mean(_mean(p.lidar - p.reference) for p in states),
+        "mean10_speed_std_mps": scatter(_std(p.lidar - p.reference) for p in states),
+        "mean10_direction_std_deg": scatter(_std_turn(p.turn) for p in states),
+        "slope": fitted,
+        "residual_std_mps": float(
+            np.sqrt(np.sum(share * residual**2) / total - (np.sum(share * residual) / total) ** 2)
+        ),
+        "direction_residual_std_deg": float(np.sqrt(np.sum(share * off**2) / total)),
+    }
 
 
 def slope(lidar_mps: FloatArray, reference_mps: FloatArray) -> float:

@@ -73,7 +73,7 @@ def uv_mps(speed_mps: ArrayLike, from_deg: ArrayLike) -> tuple[FloatArray, Float
     >>> round(float(u), 4), round(float(v), 4)
     (7.0711, 7.0711)
     """
-    speed, angle = np.asarray(speed_mps, dtype=float), np.radians(from_deg)
+    speed, angle = np.asarray(speed_mps, dtype=float), np.radians(np.asarray(from_deg, dtype=float))
     return np.asarray(-speed * np.sin(angle)), np.asarray(-speed * np.cos(angle))
 
 

@@ -29,7 +29,7 @@ PUBLISHED_SLOPE = {60: 0.998046, 30: 0.985658, 8: 0.863839}
 PUBLISHED_RESIDUAL_MPS = {60: 0.32, 30: 0.55, 8: 0.55}
 PUBLISHED_R2 = {60: 0.9977, 30: 0.9959, 8: 0.9851}
 AIR = Turbulence(intensity=0.09, length_m=170.0)
-NOISE_MPS = 0.1
+NOISE_MPS = 0.2
 
 
 def scan() -> Rays:
@@ -143,7 +143,8 @@ def sensitivities() -> dict[str, tuple[SpeedRegression, DirectionRegression]]:
     """The curve with one setting changed at a time."""
     return {
         "as above": curve(),
-        "noise 0.2 m/s": curve(noise_mps=0.2),
+        "noise 0.1 m/s": curve(noise_mps=0.1),
+        "noise 0.1 m/s, no ray sweep": curve(noise_mps=0.1, sweep=False),
         "length 150 m": curve(Turbulence(0.09, 150.0)),
         "length 190 m": curve(Turbulence(0.09, 190.0)),
         "intensity 0.08": curve(Turbulence(0.08, 170.0)),

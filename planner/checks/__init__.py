@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from planner.checks import beams, crossing, map_frame, obstruction, timing, wakes
+from planner.checks import beams, crossing, instrument, map_frame, obstruction, timing, wakes
 from planner.finding import Finding, by_severity
 from planner.plan import Plan
 
@@ -13,6 +13,7 @@ CHECKS: tuple[Callable[[Plan], Iterator[Finding]], ...] = (
     obstruction.find,
     wakes.find,
     timing.find,
+    instrument.find,
 )
 
 

@@ -43,8 +43,8 @@ def _range(layout: ScanLayout, target: str) -> Iterator[Finding]:
         yield Finding("error", "range-blind", subject, range_m, "m", least_m, text)
     if most_m is not None and range_m > most_m:
         text = (
-            f"the target is {range_m:.0f} m away, beyond the {most_m:.0f} m that {device.name} reaches at best: "
-            "move the lidar closer"
+            f"the target is {range_m:.0f} m away, beyond the {most_m:.0f} m that {device.name} reaches at "
+            "best: move the lidar closer"
         )
         yield Finding("error", "range-max", subject, range_m, "m", most_m, text)
 
@@ -55,16 +55,18 @@ def _ambiguous(layout: ScanLayout) -> Iterator[Finding]:
         device = layout.lidar.device
         known = ", ".join(f"{mode.pulse_ns:g}" for mode in device.pulses if mode.pulse_ns) or "none known"
         text = (
-            f"{device.name} has no pulse of {layout.probe.pulse_ns:g} ns in the catalogue (it has: {known}), so its "
-            "unambiguous range is not checked: correct pulse_ns, or give the instrument's pulses in the site file"
+            f"{device.name} has no pulse of {layout.probe.pulse_ns:g} ns in the catalogue (it has: {known}), "
+            "so its unambiguous range is not checked: correct pulse_ns, or give the instrument's pulses in "
+            "the site file"
         )
         yield Finding("warning", "pulse-unknown", layout.name, layout.probe.pulse_ns, "ns", None, text)
         return
     limit_m, kilohertz = layout.unambiguous_range_m, layout.pulse.pulse_repetition_hz / 1000
     if limit_m is not None and layout.farthest_m > limit_m:
         text = (
-            f"the farthest target or gate is at {layout.farthest_m:.0f} m, beyond the {limit_m:.0f} m up to which "
-            f"{kilohertz:g} kHz is unambiguous: echoes of two pulses mix; take a longer pulse or fewer gates"
+            f"the farthest target or gate is at {layout.farthest_m:.0f} m, beyond the {limit_m:.0f} m up to "
+            f"which {kilohertz:g} kHz is unambiguous: echoes of two pulses mix; take a longer pulse or fewer "
+            "gates"
         )
         yield Finding("error", "range-ambiguous", layout.name, layout.farthest_m, "m", limit_m, text)
 
@@ -79,16 +81,17 @@ def _gate(layout: ScanLayout, target: str) -> Iterator[Finding]:
     spacing_m, subject = layout.gates.spacing_m, f"{layout.name} → {target}"
     if abs(offset_m) > MISSING_SHARE * spacing_m:
         text = (
-            f"no gate is at the target, {range_m:.0f} m away: the nearest, gate {index} at {centre_m:.0f} m, is "
-            f"{abs(offset_m):.0f} m off, more than half the spacing of {spacing_m:g} m; change first_m or count"
+            f"no gate is at the target, {range_m:.0f} m away: the nearest, gate {index} at {centre_m:.0f} m, "
+            f"is {abs(offset_m):.0f} m off, more than half the spacing of {spacing_m:g} m; change first_m or "
+            "count"
         )
         limit_m = MISSING_SHARE * spacing_m
         yield Finding("error", "gate-missing", subject, abs(offset_m), "m", limit_m, text)
     elif abs(offset_m) > OFFSET_SHARE * spacing_m:
         text = (
-            f"gate {index} at {centre_m:.0f} m is {abs(offset_m):.1f} m {'behind' if offset_m > 0 else 'before'} "
-            f"the target, more than a quarter of the spacing of {spacing_m:g} m: a first_m of "
-            f"{layout.gates.first_m - offset_m:.1f} m would centre it"
+            f"gate {index} at {centre_m:.0f} m is {abs(offset_m):.1f} m "
+            f"{'behind' if offset_m > 0 else 'before'} the target, more than a quarter of the spacing of "
+            f"{spacing_m:g} m: a first_m of {layout.gates.first_m - offset_m:.1f} m would centre it"
         )
         yield Finding("info", "gate-offset", subject, abs(offset_m), "m", OFFSET_SHARE * spacing_m, text)
 
@@ -98,8 +101,8 @@ def _gate_count(layout: ScanLayout) -> Iterator[Finding]:
     gates, most = layout.gates, layout.lidar.device.max_gates
     if gates is not None and most is not None and gates.count > most:
         text = (
-            f"{gates.count} gates are asked for, {layout.lidar.device.name} has {most}: take fewer, or space them "
-            "wider"
+            f"{gates.count} gates are asked for, {layout.lidar.device.name} has {most}: take fewer, or space "
+            "them wider"
         )
         yield Finding("error", "gate-count", layout.name, gates.count, "gates", most, text)
 
@@ -112,14 +115,14 @@ def _elevation(layout: ScanLayout) -> Iterator[Finding]:
     (lowest, highest), least, most = layout.head_elevation_deg, head.elevation_min_deg, head.elevation_max_deg
     if least is not None and lowest < least:
         text = (
-            f"the head has to go down to {lowest:.2f}°, but reaches only {least:g}°: stand lower or farther away, "
-            "or choose a higher target"
+            f"the head has to go down to {lowest:.2f}°, but reaches only {least:g}°: stand lower or farther "
+            "away, or choose a higher target"
         )
         yield Finding("error", "elevation-limit", layout.name, lowest, "deg", least, text)
     if most is not None and highest > most:
         text = (
-            f"the head has to go up to {highest:.2f}°, but reaches only {most:g}°: stand farther from the target, or "
-            "end the scan lower"
+            f"the head has to go up to {highest:.2f}°, but reaches only {most:g}°: stand farther from the "
+            "target, or end the scan lower"
         )
         yield Finding("error", "elevation-limit", layout.name, highest, "deg", most, text)
 
@@ -132,8 +135,9 @@ def _vertical_wind(plan: Plan, layout: ScanLayout) -> Iterator[Finding]:
     size_mps, limit_mps = layout.vertical_bias_mps(vertical_mps), plan.site.tolerance.speed_mps
     if size_mps > limit_mps:
         text = (
-            f"a vertical wind of {vertical_mps:g} m/s looks like {size_mps:.2f} m/s of horizontal wind at this "
-            f"elevation (w·tan φ), over the tolerance of {limit_mps:g} m/s: stand farther away, or retrieve w too"
+            f"a vertical wind of {vertical_mps:g} m/s looks like {size_mps:.2f} m/s of horizontal wind at "
+            f"this elevation (w·tan φ), over the tolerance of {limit_mps:g} m/s: stand farther away, or "
+            "retrieve w too"
         )
         yield Finding("warning", "vertical-wind", layout.name, size_mps, "m/s", limit_mps, text)
 
@@ -143,8 +147,8 @@ def _aim(layout: ScanLayout) -> Iterator[Finding]:
     off_deg, miss_m = layout.aim_error_deg, layout.aim_miss_m
     if off_deg is not None and off_deg > AIM_TOLERANCE_DEG:
         text = (
-            f"the declared head angles point {off_deg:.2f}° beside target {layout.targets[0]} ({miss_m:.0f} m there), "
-            f"over {AIM_TOLERANCE_DEG:g}°: check azimuth_head_deg, elevation_head_deg and the lidar's offsets, or "
-            "leave the head angles out"
+            f"the declared head angles point {off_deg:.2f}° beside target {layout.targets[0]} ({miss_m:.0f} "
+            f"m there), over {AIM_TOLERANCE_DEG:g}°: check azimuth_head_deg, elevation_head_deg and the "
+            "lidar's offsets, or leave the head angles out"
         )
         yield Finding("warning", "aim", layout.name, off_deg, "deg", AIM_TOLERANCE_DEG, text)

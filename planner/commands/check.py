@@ -12,6 +12,8 @@ from planner.commands.options import (
     say_json,
 )
 
+KINDS = ("error", "warning", "remark")  # in the order of planner.finding.SEVERITIES
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
@@ -36,9 +38,9 @@ def check(
         print_table("", ("severity", "code", "subject", "finding"), rows, fold="finding")
     else:
         say("Nothing found.")
-    remark(
-        "{} errors, {} warnings, {} remarks; docs/findings.md says what each code means.".format(*counts),
-        quiet=quiet,
+    told = ", ".join(
+        f"{count} {kind}{'' if count == 1 else 's'}" for count, kind in zip(counts, KINDS, strict=True)
     )
+    remark(f"{told}; docs/findings.md says what each code means.", quiet=quiet)
     if counts[0]:
         raise typer.Exit(1)

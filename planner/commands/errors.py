@@ -15,9 +15,9 @@ from planner.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from planner.error_curve import ErrorCurve
+    from planner.budget import Budget
+    from planner.error_nouns import ErrorCurve
     from planner.plan import Plan
-    from planner.sector_size import Recommendation
 
 SizesOption = Annotated[
     str | None,
@@ -39,9 +39,13 @@ TierOption = Annotated[
     str | None,
     typer.Option(
         "--tier",
-        metavar="noise|linear|turbulent",
+        metavar="noise|linear|turbulent|monte-carlo",
         help="How to predict. [default: turbulent, or linear without turbulence]",
     ),
+]
+
+BudgetOption = Annotated[
+    bool, typer.Option("--budget", help="Add the uncertainty budget of the ten-minute means.")
 ]
 
 
@@ -56,25 +60,30 @@ def errors(
     sizes_from: SizesFromOption = "own",
     tier: TierOption = None,
     fidelity: FidelityOption = None,
+    budget: BudgetOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Predicted error of speed and direction per sector size, and the recommended size."""
     from planner.commands.choices import chosen, numbers
     from planner.commands.load import load_plan
+    from planner.commands.progress import shown
 
     kind = chosen("--sizes-from", sizes_from, ("own", "subset"))
-    by = None if tier is None else chosen("--tier", tier, ("noise", "linear", "turbulent"))
+    by = None if tier is None else chosen("--tier", tier, ("noise", "linear", "turbulent", "monte-carlo"))
     sizes_deg = None if sizes is None else numbers("--sizes", sizes)
     plan = load_plan(site, fidelity)
-    curves = plan.errors(tier=by, sizes_deg=sizes_deg, sizes_from=kind)
+    with shown("simulating", quiet=quiet or by != "monte-carlo") as progress:
+        curves = plan.errors(tier=by, sizes_deg=sizes_deg, sizes_from=kind, progress=progress)
     if json:
-        say_json([_document(curve, plan.recommendation(curve)) for curve in curves])
+        say_json([_document(plan, curve, budget=budget) for curve in curves])
         return
     if not curves:
         say("No sector scan and no pair has a target: there is no error to predict.")
     for curve in curves:
         _print(plan, curve)
+    for item in plan.budgets if budget else ():
+        _print_budget(item)
     remark(
         "Errors are retrieved less true, over the site's wind; scan: one scan; 10 min: its ten-minute mean against a cup at the target; "
         "slope: mast = slope · lidar; – : the tier cannot know it.",
@@ -82,7 +91,13 @@ def errors(
     )
 
 
-def _document(curve: "ErrorCurve", advice: "Recommendation") -> dict[str, object]:
+def _document(plan: "Plan", curve: "ErrorCurve", *, budget: bool) -> dict[str, object]:
+    advice = plan.recommendation(curve)
+    parts = [
+        item.entries
+        for item in plan.budgets
+        if budget and (item.scan, item.target) == (curve.scan, curve.target)
+    ]
     return {
         "lidar" if curve.lidar else "pair": curve.lidar or curve.scan,
         "scan": curve.scan,
@@ -91,8 +106,10 @@ def _document(curve: "ErrorCurve", advice: "Recommendation") -> dict[str, object
         "reference": curve.reference,
         "recommended_sector_deg": advice.sector_deg,
         "reason": advice.reason,
+        "saving": advice.saving or None,
         "states": curve.states,
         "sizes": [size.as_dict() for size in curve.sizes],
+        **({"budget": [entry._asdict() for entry in parts[0]]} if parts else {}),
     }
 
 
@@ -124,11 +141,45 @@ def _print(plan: "Plan", curve: "ErrorCurve") -> None:
     ]
     title = f"{curve.scan} → {curve.target}, {curve.tier} tier, {curve.states} states of the wind"
     print_table(title, ("sector °", "rays", "scans/10 min", "condition", *columns), rows)
-    from planner.commands.options import say
-
     advice = plan.recommendation(curve)
-    say(
-        f"Recommended: {advice.reason}.\n"
-        if advice.sector_deg is not None
-        else f"No recommendation: {advice.reason}.\n"
+    if advice.sector_deg is not None:
+        say(
+            f"Recommended: {advice.reason}."
+            + (f"\nInstead of more scans: {advice.saving}." if advice.saving else "")
+            + "\n"
+        )
+    elif curve.lidar:
+        say(f"No recommendation: {advice.reason}.\n")
+
+
+def _print_budget(budget: "Budget") -> None:
+    from planner.commands.table import print_table
+
+    def number(value: float | None, how: str) -> str:
+        return "–" if value is None else format(value, how)
+
+    rows = [
+        (
+            entry.source,
+            number(entry.speed_std_mps, ".4f"),
+            number(entry.expanded()[0], ".4f"),
+            number(entry.speed_share, ".1%"),
+            number(entry.direction_std_deg, ".3f"),
+            number(entry.expanded()[1], ".3f"),
+            number(entry.direction_share, ".1%"),
+            entry.reason or "",
+        )
+        for entry in budget.entries
+    ]
+    title = f"Uncertainty of ten-minute means of {budget.scan} → {budget.target}, wind {budget.wind.speed_mps:.1f} m/s from {budget.wind.from_deg:.0f}°"
+    columns = (
+        "source",
+        "speed m/s, k = 1",
+        "k = 2",
+        "share",
+        "direction °, k = 1",
+        "k = 2",
+        "share",
+        "why unknown",
     )
+    print_table(title, columns, rows)

@@ -41,7 +41,7 @@ def point(site: SiteArgument, json: JsonOption = False, quiet: QuietOption = Fal
     )
     print_table(plan.site.name, columns, rows)
     remark(
-        "Azimuths clockwise, from true north, grid north and as the head shows them; elevation and slant range from the head, "
-        "by the exact ellipsoid.",
+        "Azimuths clockwise, from true north, grid north and as the head shows them; elevation and slant "
+        "range from the head, by the exact ellipsoid.",
         quiet=quiet,
     )

@@ -4,9 +4,24 @@ from typing import Annotated
 
 import typer
 
-from planner.commands.options import DEFAULT_OUT, FidelityOption, JsonOption, OutOption, QuietOption, SiteArgument, remark, say, say_json
+from planner.commands.options import (
+    DEFAULT_OUT,
+    FidelityOption,
+    JsonOption,
+    OutOption,
+    QuietOption,
+    SiteArgument,
+    remark,
+    say,
+    say_json,
+)
 
-SecondSite = Annotated[str | None, typer.Argument(metavar="[SITE2]", help="A second site file, to be compared with the first.", show_default=False)]
+SecondSite = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[SITE2]", help="A second site file, to be compared with the first.", show_default=False
+    ),
+]
 
 
 def register(app: typer.Typer) -> None:

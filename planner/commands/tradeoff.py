@@ -4,7 +4,15 @@ from typing import Annotated
 
 import typer
 
-from planner.commands.options import DEFAULT_OUT, JsonOption, OutOption, QuietOption, SiteArgument, remark, say_json
+from planner.commands.options import (
+    DEFAULT_OUT,
+    JsonOption,
+    OutOption,
+    QuietOption,
+    SiteArgument,
+    remark,
+    say_json,
+)
 
 SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Start of the random numbers.")]
 

@@ -20,7 +20,9 @@ KINDS = ("html", "png", "glb")
 
 KindOption = Annotated[
     str | None,
-    typer.Option("--as", metavar="html,png,glb", help="What to write. [default: html, and png where OpenGL is]"),
+    typer.Option(
+        "--as", metavar="html,png,glb", help="What to write. [default: html, and png where OpenGL is]"
+    ),
 ]
 StretchOption = Annotated[
     float, typer.Option("--exaggeration", metavar="FACTOR", help="Stretch heights; 1 is true proportions.")

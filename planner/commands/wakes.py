@@ -16,6 +16,7 @@ from planner.commands.options import (
 
 if TYPE_CHECKING:
     from geometry.angles import SectorSet
+    from planner.exclusion import Exclusion
 
 
 def register(app: typer.Typer) -> None:
@@ -32,50 +33,53 @@ def wakes(
 
     plan = load_plan(site, fidelity)
     if json:
-        say_json(
-            [
-                {
-                    "lidar": item.lidar,
-                    "scan": item.scan,
-                    "target": item.target,
-                    "model": item.model,
-                    "excluded_deg": item.excluded.pairs(),
-                    "free_deg": item.free.pairs(),
-                    "excluded_by": [
-                        {"source": source, "model": model, "excluded_deg": sectors.pairs()}
-                        for source, model, sectors in item.by_source
-                    ],
-                    "lost_share": item.lost_share,
-                }
-                for item in plan.exclusions
-            ]
-        )
+        say_json([_record(item) for item in plan.exclusions])
         return
     if not plan.exclusions:
         say("No scan has a target: there is no measured volume to look at.")
         return
-    rows = [
-        (
-            item.lidar,
-            item.scan,
-            item.target,
-            _spans(item.of_model("jensen")),
-            _spans(item.of_model("iec")),
-            _spans(item.free),
-            f"{item.lost_share:.0%}",
-        )
-        for item in plan.exclusions
-    ]
     columns = ("lidar", "scan", "target", "excluded, Jensen", "excluded, IEC", "free", "wanted wind lost")
-    print_table(plan.site.name, columns, rows)
+    print_table(plan.site.name, columns, [_row(item) for item in plan.exclusions])
     remark(
-        "Directions the wind comes from, degrees from true north, in which no wake touches what the scan measures (the arc of its gates, "
-        "the probe of a stare).",
+        "Degrees from true north that the wind comes from. Excluded: a wake touches what the scan measures, "
+        "the arc of its gates or the probe of a stare. Free: none does.",
         quiet=quiet,
     )
 
 
+def _record(item: "Exclusion") -> dict[str, object]:
+    """One exclusion for machines."""
+    return {
+        "lidar": item.lidar,
+        "scan": item.scan,
+        "target": item.target,
+        "model": item.model,
+        "excluded_deg": item.excluded.pairs(),
+        "free_deg": item.free.pairs(),
+        "excluded_at_target_deg": item.point.pairs(),
+        "excluded_by": [
+            {"source": source, "model": model, "excluded_deg": sectors.pairs()}
+            for source, model, sectors in item.by_source
+        ],
+        "lost_share": item.lost_share,
+    }
+
+
+def _row(item: "Exclusion") -> tuple[str, ...]:
+    """One exclusion for people."""
+    return (
+        item.lidar,
+        item.scan,
+        item.target,
+        _spans(item.of_model("jensen")),
+        _spans(item.of_model("iec")),
+        _spans(item.free),
+        f"{item.lost_share:.0%}",
+    )
+
+
 def _spans(sectors: "SectorSet") -> str:
+    """Sectors in words: 339–21, or none, or all."""
     if sectors.width_deg >= 360.0:
         return "all"
     return ", ".join(f"{start:.0f}–{stop:.0f}" for start, stop in sectors.pairs()) or "none"

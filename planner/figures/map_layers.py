@@ -13,7 +13,18 @@ from geometry.wakes import wake_outline_m
 from planner.crossings import beam_line
 from planner.exclusion import Exclusion
 from planner.figures.names import Name, shown
-from planner.palette import CROSSING, EXCLUDED, INK, INK_SOFT, MAST, OBSTACLE, PAPER, TURBINE, WAKE, lidar_colour
+from planner.palette import (
+    CROSSING,
+    EXCLUDED,
+    INK,
+    INK_SOFT,
+    MAST,
+    OBSTACLE,
+    PAPER,
+    TURBINE,
+    WAKE,
+    lidar_colour,
+)
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
 
@@ -32,7 +43,7 @@ CIRCLE = np.linspace(0.0, 2 * np.pi, 73)
 
 @dataclass
 class Layer:
-    """What a layer leaves for the map to finish: corners it must show, names to place, lines to keep free, its legend."""
+    """What a layer leaves for the map to finish: corners, names to place, lines to keep free, a legend."""
 
     corners: list[FloatArray] = field(default_factory=list)  # each (n, 2), metres east and north
     names: list[Name] = field(default_factory=list)
@@ -52,7 +63,7 @@ def along(start: FloatArray, end: FloatArray) -> FloatArray:
 
 
 def scans(plan: Plan, axes: "Axes") -> Iterator[Layer]:
-    """Every scan: its rays up to the measured gate, the gate's probe or arc, and what is lost behind solids."""
+    """Every scan: its rays up to the measured gate, the gate's probe or arc, what is lost behind solids."""
     stares: dict[str, Any] = {}
     for layout in plan.layouts:
         layer = _stare(plan, axes, layout) if layout.scan.count == 1 else _fan(plan, axes, layout)
@@ -60,10 +71,17 @@ def scans(plan: Plan, axes: "Axes") -> Iterator[Layer]:
             yield layer
             continue
         lidar = layout.lidar.name
-        stares.setdefault(lidar, (layer.legend[0][0], []))[1].append(layout.targets[0] if layout.targets else layout.name)
+        stares.setdefault(lidar, (layer.legend[0][0], []))[1].append(
+            layout.targets[0] if layout.targets else layout.name
+        )
         layer.legend.clear()
         yield layer
-    yield Layer(legend=[(line, f"stare of {shown(lidar)} at {shown(', '.join(to))}") for lidar, (line, to) in stares.items()])
+    yield Layer(
+        legend=[
+            (line, f"stare of {shown(lidar)} at {shown(', '.join(to))}")
+            for lidar, (line, to) in stares.items()
+        ]
+    )
 
 
 def _reach_m(layout: ScanLayout) -> float:
@@ -75,18 +93,29 @@ def _fan(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
     colour, reach_m = lidar_colour(layout.lidar_index), _reach_m(layout)
     azimuth_deg, elevation_deg = layout.edges_deg()
     head = plan.places.local_m(layout.lidar.position)[:2]
-    arc = plan.places.beam_local_m(layout.lidar, azimuth_deg, elevation_deg, np.full(len(azimuth_deg), reach_m))[:, :2]
+    arc = plan.places.beam_local_m(
+        layout.lidar, azimuth_deg, elevation_deg, np.full(len(azimuth_deg), reach_m)
+    )[:, :2]
     ring = np.vstack([head, arc, head])
     (area,) = axes.fill(ring[:, 0], ring[:, 1], color=colour, alpha=0.10, linewidth=0, zorder=2)
     lost_m = _lost_ranges_m(plan, layout)
     for end, lost in zip(arc[1:-1], lost_m, strict=True):
         if layout.scan.count <= FEW_RAYS:
             stop = head + (end - head) * min(lost / reach_m, 1.0)
-            axes.plot([head[0], stop[0]], [head[1], stop[1]], color=colour, linewidth=0.5, alpha=0.45, zorder=3)
+            axes.plot(
+                [head[0], stop[0]], [head[1], stop[1]], color=colour, linewidth=0.5, alpha=0.45, zorder=3
+            )
     axes.plot(arc[:, 0], arc[:, 1], color=colour, linewidth=2.2, zorder=4)
     lost = _lost(axes, head, arc[1:-1], lost_m / reach_m)
     edge = along(head, arc[0]), along(head, arc[-1])
-    legend = [(area, f"{layout.spec.type} scan {shown(layout.name)} of {shown(layout.lidar.name)}; arc: gate at {reach_m:.0f} m"), *lost]
+    legend = [
+        (
+            area,
+            f"{layout.spec.type} scan “{shown(layout.name)}” of {shown(layout.lidar.name)}; "
+            f"arc: gate at {reach_m:.0f} m",
+        ),
+        *lost,
+    ]
     return Layer([np.vstack([head, arc])], [], [*edge, arc], legend)
 
 
@@ -106,7 +135,12 @@ def _lost(axes: "Axes", head: FloatArray, ends: FloatArray, share: FloatArray) -
         if part < 1:
             start = head + part * (end - head)
             shown_lines += axes.plot(
-                [start[0], end[0]], [start[1], end[1]], color=EXCLUDED, linewidth=1.1, linestyle=(0, (3, 2)), zorder=5
+                [start[0], end[0]],
+                [start[1], end[1]],
+                color=EXCLUDED,
+                linewidth=1.1,
+                linestyle=(0, (3, 2)),
+                zorder=5,
             )
     return [(shown_lines[0], "lost behind a rotor, tower, mast or obstacle")] if shown_lines else []
 
@@ -126,14 +160,18 @@ def _stare(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
 
 
 def wakes(plan: Plan, axes: "Axes") -> Iterator[Layer]:
-    """Wakes in the prevailing wind, for their size: which directions they take is the ring's and the rose's matter."""
+    """Wakes in the prevailing wind, for their size; which directions they take say ring and rose."""
     wind_deg = plan.prevailing_deg
     if not plan.site.turbines or np.isnan(wind_deg):
         return
     drawn = []
     for hub, turbine in zip(plan.places.hubs_m, plan.site.turbines, strict=True):
         outline = wake_outline_m(
-            hub, turbine.rotor_diameter_m, wind_deg, decay=plan.site.wakes.decay, length_m=WAKE_DIAMETERS * turbine.rotor_diameter_m
+            hub,
+            turbine.rotor_diameter_m,
+            wind_deg,
+            decay=plan.site.wakes.decay,
+            length_m=WAKE_DIAMETERS * turbine.rotor_diameter_m,
         )
         drawn += axes.fill(*outline.polygon_m[:, :2].T, color=WAKE, alpha=0.13, linewidth=0, zorder=1)
     text = f"wakes in the prevailing wanted wind, from {wind_deg:.0f}°, {WAKE_DIAMETERS} diameters long"
@@ -141,16 +179,18 @@ def wakes(plan: Plan, axes: "Axes") -> Iterator[Layer]:
 
 
 def most_lost(plan: Plan) -> list[Exclusion]:
-    """Of each target the exclusion of the scan that wakes take most from; targets without wakes are left out."""
+    """Of each target the exclusion of the scan that wakes take most from; without wakes none."""
     most: dict[str, Exclusion] = {}
     for item in plan.exclusions:
-        if item.excluded.sectors and (item.target not in most or item.excluded.width_deg > most[item.target].excluded.width_deg):
+        if item.excluded.sectors and (
+            item.target not in most or item.excluded.width_deg > most[item.target].excluded.width_deg
+        ):
             most[item.target] = item
     return list(most.values())
 
 
 def excluded_rings(plan: Plan, axes: "Axes", side_m: float) -> Iterator[Layer]:
-    """Around each target the directions from which a wake reaches what is measured, of the scan that loses most."""
+    """Around each target the directions from which a wake reaches what its worst-off scan measures."""
     from matplotlib.patches import Wedge
 
     inner_m, outer_m = (share * side_m for share in RING_SHARE)
@@ -159,8 +199,20 @@ def excluded_rings(plan: Plan, axes: "Axes", side_m: float) -> Iterator[Layer]:
         patch: Any = None
         for sectors, colour, alpha in ((SectorSet.full(), INK_SOFT, 0.10), (item.excluded, EXCLUDED, 0.45)):
             for sector in sectors.sectors:
-                start = 90.0 - sector.from_deg - sector.width_deg  # matplotlib counts counter-clockwise from east
-                patch = Wedge(tuple(centre), outer_m, start, start + sector.width_deg, width=outer_m - inner_m, color=colour, alpha=alpha, linewidth=0, zorder=3)
+                start = (
+                    90.0 - sector.from_deg - sector.width_deg
+                )  # matplotlib counts counter-clockwise from east
+                patch = Wedge(
+                    tuple(centre),
+                    outer_m,
+                    start,
+                    start + sector.width_deg,
+                    width=outer_m - inner_m,
+                    color=colour,
+                    alpha=alpha,
+                    linewidth=0,
+                    zorder=3,
+                )
                 axes.add_patch(patch)
         circle = centre + outer_m * toward(np.arange(0.0, 360.0, 6.0))
         text = "ring: wind from here brings a wake into what is measured (the scan that loses most)"
@@ -171,15 +223,28 @@ def things(plan: Plan, axes: "Axes") -> Layer:
     """Lidars, masts, turbines, obstacles and targets with their names."""
     layer, site, places = Layer(), plan.site, plan.places
 
-    def mark(name: str, position: tuple[float, float, float], marker: str, colour: str, size: float, rank: int) -> None:
+    def mark(
+        name: str, position: tuple[float, float, float], marker: str, colour: str, size: float, rank: int
+    ) -> None:
         here = places.local_m(position)[:2]
-        axes.plot(*here, marker=marker, color=colour, markersize=size, markeredgecolor=PAPER, markeredgewidth=0.8, zorder=7, linestyle="none")
+        axes.plot(
+            *here,
+            marker=marker,
+            color=colour,
+            markersize=size,
+            markeredgecolor=PAPER,
+            markeredgewidth=0.8,
+            zorder=7,
+            linestyle="none",
+        )
         layer.corners.append(here[None])
         layer.names.append(Name(shown(name), here, colour, rank))
 
     for hub, turbine in zip(places.hubs_m, site.turbines, strict=True):
         circle = hub[:2] + turbine.rotor_diameter_m / 2 * np.stack([np.sin(CIRCLE), np.cos(CIRCLE)], axis=-1)
-        layer.legend = [(axes.plot(*circle.T, color=TURBINE, linewidth=1.0, zorder=5)[0], "rotors, turned to any wind")]
+        layer.legend = [
+            (axes.plot(*circle.T, color=TURBINE, linewidth=1.0, zorder=5)[0], "rotors, turned to any wind")
+        ]
         layer.corners.append(circle)
         mark(turbine.name, turbine.position, "o", INK_SOFT, 5, 2)
     for obstacle in site.obstacles:
@@ -199,7 +264,10 @@ def opening_angles(plan: Plan, axes: "Axes") -> Iterator[Layer]:
         target = plan.places.local_m(plan.site.target_position_m(met.target))
         heads = [beam_line(plan.places, plan.layout[name], met.target)[0] for name in (met.scan1, met.scan2)]
         first, second = (beam_to(head - target) for head in heads)
-        start, turn = float(first.azimuth_deg), float(difference_deg(float(second.azimuth_deg), float(first.azimuth_deg)))
+        start, turn = (
+            float(first.azimuth_deg),
+            float(difference_deg(float(second.azimuth_deg), float(first.azimuth_deg))),
+        )
         radius_m = ARC_SHARE * min(float(first.range_m), float(second.range_m))
         arc = target[:2] + radius_m * toward(start + np.linspace(0.0, turn, 40))
         axes.plot(*arc.T, color=INK, linewidth=1.2, zorder=6)

@@ -12,6 +12,7 @@ from planner.scene.placement import leader_end_px, place_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 LONGEST = 32  # characters of a name in a figure; the tables have it whole
 NO_GLYPH = "□"  # where the font has no such letter
@@ -53,7 +54,7 @@ def _letters() -> frozenset[int]:
     return frozenset(get_font(findfont("DejaVu Sans")).get_charmap())
 
 
-def draw_names(axes: "Axes", names: Sequence[Name], busy: FloatArray) -> None:
+def draw_names(axes: "Axes", names: Sequence[Name], busy: FloatArray) -> "list[Text]":
     """Write names near their places, off each other and off what is drawn, joined by leader lines.
 
     The axes must have their final limits: the layout is made once to learn where everything is.
@@ -66,15 +67,29 @@ def draw_names(axes: "Axes", names: Sequence[Name], busy: FloatArray) -> None:
         What to write.
     busy
         (n, 2) Samples of what had better not be covered, in the axes' data.
+
+    Returns
+    -------
+    list of Text
+        One for each name, in their order.
     """
     if not names:
-        return
-    axes.figure.draw_without_rendering()
+        return []
+    axes.figure.canvas.figure.draw_without_rendering()
     to_px = axes.transData.transform
     texts = [
         axes.text(
-            0, 0, name.text, fontsize=name.size, color=name.colour, fontweight="bold" if name.bold else "normal",
-            ha="center", va="center", zorder=10, parse_math=False, in_layout=False,
+            0,
+            0,
+            name.text,
+            fontsize=name.size,
+            color=name.colour,
+            fontweight="bold" if name.bold else "normal",
+            ha="center",
+            va="center",
+            zorder=10,
+            parse_math=False,
+            in_layout=False,
             bbox={"boxstyle": "round,pad=0.15", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.8},
         )
         for name in names
@@ -86,9 +101,10 @@ def draw_names(axes: "Axes", names: Sequence[Name], busy: FloatArray) -> None:
     bounds = (frame.x0 + BORDER_PX, frame.y0 + BORDER_PX, frame.x1 - BORDER_PX, frame.y1 - BORDER_PX)
     middles = place_names(anchors, sizes, bounds, ranks=[name.rank for name in names], busy_px=to_px(busy))
     back = axes.transData.inverted().transform
-    for text, name, anchor, middle, size in zip(texts, names, anchors, middles, sizes, strict=True):
+    for text, anchor, middle, size in zip(texts, anchors, middles, sizes, strict=True):
         text.set_position(tuple(back(middle)))
         end = leader_end_px(anchor, middle, size)
         if np.linalg.norm(end - anchor) > LEADER_PX:
             line = back(np.stack([anchor, end]))
             axes.plot(line[:, 0], line[:, 1], color=INK_SOFT, linewidth=0.7, zorder=8)
+    return texts

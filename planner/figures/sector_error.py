@@ -1,4 +1,4 @@
-"""Predicted error against sector size: speed and direction, of one scan and of ten-minute means, and the slope."""
+"""Predicted error against sector size: speed, direction and slope, of one scan and of ten-minute means."""
 
 from collections.abc import Sequence
 from math import ceil
@@ -51,9 +51,20 @@ class Panel(NamedTuple):
 
 PANELS = (
     Panel("Speed, one scan", "m/s", (("speed_std_mps", "std", "-"), ("speed_bias_mps", "bias", "--"))),
-    Panel("Speed, ten-minute mean", "m/s", (("mean10_speed_std_mps", "std", "-"), ("mean10_speed_bias_mps", "bias", "--"))),
-    Panel("Direction", "°", (("direction_std_deg", "std, one scan", "-"), ("mean10_direction_std_deg", "std, ten-minute mean", ":"))),
-    Panel("Slope, mast = slope × lidar", "1", (("slope", "slope", "-"),), zero=False),
+    Panel(
+        "Speed, ten-minute mean",
+        "m/s",
+        (("mean10_speed_std_mps", "std", "-"), ("mean10_speed_bias_mps", "bias", "--")),
+    ),
+    Panel(
+        "Direction",
+        "°",
+        (
+            ("direction_std_deg", "std, one scan", "-"),
+            ("mean10_direction_std_deg", "std, ten-minute mean", ":"),
+        ),
+    ),
+    Panel("Slope, mast = slope × lidar", "", (("slope", "slope", "-"),), zero=False),
 )
 
 
@@ -82,7 +93,11 @@ def sector_error(
     bytes or None
         None where nothing at all is known for at least two sizes.
     """
-    panels = [panel for panel in PANELS if any(_known(curve, field) for curve in curves for field, _, _ in panel.lines)]
+    panels = [
+        panel
+        for panel in PANELS
+        if any(_known(curve, field) for curve in curves for field, _, _ in panel.lines)
+    ]
     if not panels:
         return None
     columns = min(PER_ROW, len(panels))
@@ -92,13 +107,20 @@ def sector_error(
         for axes, panel in zip(all_axes, panels, strict=False):
             _panel(axes, panel, curves, recommended_deg)
             if published is not None and panel.title.startswith("Slope"):
-                axes.plot(published.sector_deg, published.slope, "o", color=EXCLUDED, markersize=6, label=published.label)
+                axes.plot(
+                    published.sector_deg,
+                    published.slope,
+                    "o",
+                    color=EXCLUDED,
+                    markersize=6,
+                    label=published.label,
+                )
         for axes in all_axes[len(panels) :]:
             axes.set_axis_off()
         for axes in all_axes[max(len(panels) - columns, 0) : len(panels)]:
             axes.set_xlabel("sector [°]")
             axes.tick_params(labelbottom=True)
-        _finish(figure, all_axes[: len(panels)], shown(title, longest=70))
+        _finish(figure, list(all_axes[: len(panels)]), shown(title, longest=70))
         return image(figure)
 
 
@@ -112,16 +134,29 @@ def _panel(axes: "Axes", panel: Panel, curves: Sequence[TierCurve], recommended_
             if not _known(curve, field):
                 continue
             axes.plot(
-                curve.sector_deg, getattr(curve, field), style, marker="o", markersize=3.5, linewidth=1.6,
-                color=LIDARS[number % len(LIDARS)], label=what if len(curves) == 1 else f"{what}, {curve.tier}",
+                curve.sector_deg,
+                getattr(curve, field),
+                style,
+                marker="o",
+                markersize=3.5,
+                linewidth=1.6,
+                color=LIDARS[number % len(LIDARS)],
+                label=what if len(curves) == 1 else f"{what}, {curve.tier}",
             )
     if panel.zero:
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 0.0), max(high, 0.0))
     if recommended_deg is not None:
-        axes.axvline(recommended_deg, color=INK_SOFT, linewidth=1.2, linestyle=(0, (4, 3)), zorder=1, label=f"recommended: {recommended_deg:g}°")
+        axes.axvline(
+            recommended_deg,
+            color=INK_SOFT,
+            linewidth=1.2,
+            linestyle=(0, (4, 3)),
+            zorder=1,
+            label=f"recommended: {recommended_deg:g}°",
+        )
     axes.set_title(panel.title, fontsize=10.5)
-    axes.set_ylabel(f"[{panel.axis}]")
+    axes.set_ylabel(f"[{panel.axis}]" if panel.axis else "")
 
 
 def _finish(figure: "Figure", all_axes: Sequence["Axes"], title: str) -> None:

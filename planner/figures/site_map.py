@@ -1,7 +1,7 @@
 """The plan map: everything to scale, beams, sectors, wakes, excluded directions and opening angles."""
 
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +21,8 @@ WIDTH_IN = 9.0
 MARGIN = 0.07  # of the longer side, around everything
 SMALLEST_M = 100.0  # side of the smallest map
 FLATTEST, STEEPEST = 0.45, 1.25  # height over width of the map
-SIDES_IN, HEAD_AND_FOOT_IN = 0.9, 2.6  # around the axes: numbers, title, legend; what is left over is cut off
+SIDES_IN, HEAD_AND_FOOT_IN = 0.9, 1.15  # around the axes: numbers and title
+LINE_IN = 0.2  # a line of the legend
 TWO_COLUMNS = 52  # characters of the longest text of a legend in two columns
 
 
@@ -29,13 +30,16 @@ def site_map(plan: Plan) -> bytes:
     """Draw the map as a PNG; east to the right, true north up, axes in metres from the middle of the site."""
     low, high = _limits(plan)
     wide, tall = high - low
-    with canvas(WIDTH_IN, (WIDTH_IN - SIDES_IN) * tall / wide + HEAD_AND_FOOT_IN) as figure:
+    with canvas(WIDTH_IN, WIDTH_IN) as figure:
         axes = figure.add_subplot()
         _frame(axes, low, high)
         layers = list(_layers(plan, axes, float(max(wide, tall))))
-        _marks(plan, axes, float(wide))
+        _marks(axes, float(wide))
         axes.set_title(f"{shown(plan.site.name)}: plan", parse_math=False, pad=14)
-        _legend(figure, layers)
+        lines = _legend(figure, layers)
+        figure.set_size_inches(
+            WIDTH_IN, (WIDTH_IN - SIDES_IN) * tall / wide + HEAD_AND_FOOT_IN + LINE_IN * lines
+        )
         busy = np.vstack([np.empty((0, 2)), *(samples for layer in layers for samples in layer.busy)])
         draw_names(axes, [name for layer in layers for name in layer.names], busy)
         return image(figure)
@@ -54,7 +58,9 @@ def _layers(plan: Plan, axes: "Axes", side_m: float) -> "chain[Layer]":
 def _limits(plan: Plan) -> tuple[FloatArray, FloatArray]:
     """South-west and north-east corner (2,) of the map [m]: tight, but neither a strip nor a point."""
     with canvas(1, 1) as nowhere:  # drawn once to learn what has to be seen
-        corners = [corner for layer in _layers(plan, nowhere.add_subplot(), SMALLEST_M) for corner in layer.corners]
+        corners = [
+            corner for layer in _layers(plan, nowhere.add_subplot(), SMALLEST_M) for corner in layer.corners
+        ]
     points = np.vstack(corners)
     low, high = points.min(axis=0), points.max(axis=0)
     room = MARGIN * max(float(np.max(high - low)), SMALLEST_M)
@@ -78,23 +84,53 @@ def _frame(axes: "Axes", low: FloatArray, high: FloatArray) -> None:
         axis.set_major_locator(MultipleLocator(step_m))
 
 
-def _marks(plan: Plan, axes: "Axes", wide_m: float) -> None:
+def _marks(axes: "Axes", wide_m: float) -> None:
     """North arrow and scale bar, above the map where nothing is drawn."""
     low, high = axes.get_ylim()
     inch = wide_m / (high - low) / (WIDTH_IN - SIDES_IN)  # as a share of the height of the axes
-    foot, head = 1.0 + 0.05 * inch, 1.0 + 0.45 * inch
+    foot, head = 1.0 + 0.05 * inch, 1.0 + 0.36 * inch
     axes.annotate(
-        "", xy=(0.985, head), xytext=(0.985, foot), xycoords="axes fraction", annotation_clip=False,
-        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.6, "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0},
+        "",
+        xy=(0.985, head),
+        xytext=(0.985, foot),
+        xycoords="axes fraction",
+        annotation_clip=False,
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": INK,
+            "linewidth": 1.6,
+            "mutation_scale": 14,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
     )
-    axes.text(0.972, foot, "N", transform=axes.transAxes, ha="right", va="bottom", fontsize=11, fontweight="bold")
+    axes.text(
+        0.972, foot, "N", transform=axes.transAxes, ha="right", va="bottom", fontsize=11, fontweight="bold"
+    )
     length_m = _round_m(wide_m / 5)
     right = axes.get_xlim()[0] + 0.93 * wide_m
     across = axes.get_xaxis_transform()  # metres across, share of the axes upwards
     bar = 1.0 + 0.12 * inch
-    axes.plot([right - length_m, right], [bar, bar], color=INK, linewidth=3, transform=across, clip_on=False, solid_capstyle="butt")
+    axes.plot(
+        [right - length_m, right],
+        [bar, bar],
+        color=INK,
+        linewidth=3,
+        transform=across,
+        clip_on=False,
+        solid_capstyle="butt",
+    )
     label = f"{length_m:g} m" if length_m < 1000 else f"{length_m / 1000:g} km"
-    axes.text(right - length_m / 2, bar + 0.05 * inch, label, transform=across, ha="center", va="bottom", fontsize=9, color=INK_SOFT)
+    axes.text(
+        right - length_m / 2,
+        bar + 0.05 * inch,
+        label,
+        transform=across,
+        ha="center",
+        va="bottom",
+        fontsize=9,
+        color=INK_SOFT,
+    )
 
 
 def _round_m(length_m: float) -> float:
@@ -103,14 +139,15 @@ def _round_m(length_m: float) -> float:
     return float(max(step for step in (1.0, 2.0, 5.0) if step * power <= length_m * (1 + 1e-9)) * power)
 
 
-def _legend(figure: "Figure", layers: list[Layer]) -> None:
-    """Below the map; each text once."""
-    entries: dict[str, object] = {}
+def _legend(figure: "Figure", layers: list[Layer]) -> int:
+    """Below the map, each text once; gives its number of lines."""
+    entries: dict[str, Any] = {}
     for handle, text in chain.from_iterable(layer.legend for layer in layers):
         entries.setdefault(text, handle)
     if not entries:
-        return
+        return 0
     columns = 2 if max(map(len, entries)) <= TWO_COLUMNS else 1
     legend = figure.legend(list(entries.values()), list(entries), loc="outside lower left", ncols=columns)
-    for text in legend.get_texts():
-        text.set_parse_math(False)
+    for line in legend.get_texts():
+        line.set_parse_math(False)
+    return -(-len(entries) // columns)

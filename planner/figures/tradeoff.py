@@ -27,7 +27,14 @@ def tradeoff_figure(trades: Sequence[Trade]) -> bytes:
             for index, trade in enumerate(rows):
                 height = max(trade.error, floor) if trade.error is not None else floor
                 marker = "o" if trade.error is not None else "*"
-                axes.plot(trade.time_s, height, marker=marker, markersize=9, color=LIDARS[index % len(LIDARS)], linestyle="none")
+                axes.plot(
+                    trade.time_s,
+                    height,
+                    marker=marker,
+                    markersize=9,
+                    color=LIDARS[index % len(LIDARS)],
+                    linestyle="none",
+                )
                 axes.annotate(
                     trade.method + (" (reference)" if trade.error is None else ""),
                     (trade.time_s, height),
@@ -40,8 +47,13 @@ def tradeoff_figure(trades: Sequence[Trade]) -> bytes:
             if noise:
                 axes.axhline(noise, color=INK_SOFT, linestyle=":", linewidth=1)
                 axes.annotate(
-                    "standard error of the judge", (0.98, noise), xycoords=("axes fraction", "data"), ha="right", va="bottom",
-                    fontsize=8, color=INK_SOFT,
+                    "standard error of the judge",
+                    (0.98, noise),
+                    xycoords=("axes fraction", "data"),
+                    ha="right",
+                    va="bottom",
+                    fontsize=8,
+                    color=INK_SOFT,
                 )
             axes.set_xscale("log")
             axes.set_yscale("log")

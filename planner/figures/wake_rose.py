@@ -30,13 +30,13 @@ class Ring(NamedTuple):
 
 
 def wake_rose(plan: Plan) -> bytes | None:
-    """Draw the roses as a PNG; north up, directions the wind comes from. None where no wake reaches any scan."""
+    """Draw the roses as a PNG, north up, directions from; None where no wake reaches any scan."""
     items = [item for item in plan.exclusions if item.excluded.sectors]
     if not items:
         return None
     columns = min(PER_ROW, len(items))
     rows = ceil(len(items) / columns)
-    with canvas(3.4 * columns, 3.7 * rows + 0.5) as figure:
+    with canvas(3.8 * columns, 3.8 * rows + 0.9) as figure:
         for number, item in enumerate(items):
             axes = figure.add_subplot(rows, columns, number + 1, projection="polar")
             _rose(axes, item)
@@ -62,14 +62,32 @@ def _rose(axes: Any, item: Exclusion) -> None:
     axes.set_yticks([])
     axes.grid(visible=False)
     axes.spines["polar"].set_visible(False)
-    axes.set_xticks(np.deg2rad(np.arange(0, 360, 30)), ["N", "30°", "60°", "E", "120°", "150°", "S", "210°", "240°", "W", "300°", "330°"])
+    axes.set_xticks(
+        np.deg2rad(np.arange(0, 360, 30)),
+        ["N", "30°", "60°", "E", "120°", "150°", "S", "210°", "240°", "W", "300°", "330°"],
+    )
     axes.tick_params(pad=-1)
     for number, ring in enumerate(drawn):
         inner = INNERMOST + number * RING_STEP
         _ring(axes, SectorSet.full(), inner, ring.colour, FAINT)
         _ring(axes, ring.sectors, inner, ring.colour, STRONG)
-    axes.text(0, 0, f"{percent(item.lost_share)}\nlost", ha="center", va="center", fontsize=11, fontweight="bold", linespacing=1.3)
-    axes.set_title(f"{shown(item.scan, longest=18)} → {shown(item.target, longest=18)}", fontsize=10, loc="center", pad=10, parse_math=False)
+    axes.text(
+        0,
+        0,
+        f"{percent(item.lost_share)}\nlost",
+        ha="center",
+        va="center",
+        fontsize=11,
+        fontweight="bold",
+        linespacing=1.3,
+    )
+    axes.set_title(
+        f"{shown(item.scan, longest=18)} → {shown(item.target, longest=18)}",
+        fontsize=10,
+        loc="center",
+        pad=10,
+        parse_math=False,
+    )
 
 
 def _ring(axes: Any, sectors: SectorSet, inner: float, colour: str, opacity: float) -> None:
@@ -84,4 +102,6 @@ def _legend(figure: "Figure", item: Exclusion, columns: int) -> None:
     patches = [Patch(color=ring.colour, label=f"{ring.name}", alpha=STRONG) for ring in rings(item)]
     patches[0].set_label(f"{patches[0].get_label()} (innermost)")
     patches[-1].set_label(f"{patches[-1].get_label()} (outermost)")
-    figure.legend(handles=patches, loc="outside lower center", ncols=4 if columns > 2 else columns, fontsize=9)
+    figure.legend(
+        handles=patches, loc="outside lower center", ncols=4 if columns > 2 else columns, fontsize=9
+    )

@@ -23,6 +23,7 @@ TAGGED: dict[str, type[BaseModel] | None] = {
     "<catalogue>": None,
     "<word>": None,
     "<effects>": None,
+    "<pairs>": None,
 }
 
 SHAPES = {  # what a short list of numbers holds, by the key that it stands under
@@ -67,7 +68,7 @@ def is_echo(details: ErrorDetails) -> bool:
     return details["type"] == "too_short" and isinstance(came, list | tuple) and len(came) >= least
 
 
-def fault_of(details: ErrorDetails, raw: object) -> Fault:
+def fault_of(details: ErrorDetails, raw: object, *, root: type[BaseModel] = Site) -> Fault:
     """One error of pydantic as a fault of the site file.
 
     Parameters
@@ -77,7 +78,7 @@ def fault_of(details: ErrorDetails, raw: object) -> Fault:
     raw : object
         The mapping that was validated.
     """
-    loc, model = _place(details["loc"])
+    loc, model = _place(details["loc"], root)
     kind, context = details["type"], details.get("ctx", {})
     if kind == "extra_forbidden":
         return _unknown_key(loc, model)
@@ -146,9 +147,9 @@ def _wanted(model: type[BaseModel], key: str) -> str:
     return {float: "a number", int: "a whole number", str: "text"}.get(annotation, "a list")  # type: ignore[arg-type]
 
 
-def _place(loc: tuple[int | str, ...]) -> tuple[Loc, type[BaseModel]]:
+def _place(loc: tuple[int | str, ...], root: type[BaseModel]) -> tuple[Loc, type[BaseModel]]:
     """The place in the file, without the tags of unions, and the noun that the last key belongs to."""
-    model: type[BaseModel] = Site
+    model = root
     owner = model
     place: list[int | str] = []
     for part in loc:

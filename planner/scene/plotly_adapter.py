@@ -145,7 +145,7 @@ def _traces(layer: Layer) -> list[dict[str, Any]]:
     traces = [_mesh(layer, mesh) for mesh in layer.meshes]
     traces += [_lines(layer, lines) for lines in layer.lines]
     traces += [_points(layer, points) for points in layer.points]
-    common = {"name": html.escape(layer.name), "legendgroup": layer.name, "showlegend": False}
+    common = {"name": html.escape(layer.name, quote=False), "legendgroup": layer.name, "showlegend": False}
     traces = [{**trace, **common} for trace in traces]
     if layer.in_legend:
         traces.append({**_legend_entry(layer), **common, "showlegend": True})
@@ -164,7 +164,7 @@ def _columns(points_m: FloatArray) -> dict[str, list[float]]:
 
 
 def _hover(text: str) -> dict[str, Any]:
-    return {"hoverinfo": "text", "hovertext": html.escape(text)} if text else {"hoverinfo": "skip"}
+    return {"hoverinfo": "text", "hovertext": html.escape(text, quote=False)} if text else {"hoverinfo": "skip"}
 
 
 def _mesh(layer: Layer, mesh: Mesh) -> dict[str, Any]:
@@ -203,7 +203,7 @@ def _lines(layer: Layer, lines: Lines) -> dict[str, Any]:
 def _points(layer: Layer, points: Points) -> dict[str, Any]:
     hover: dict[str, Any] = {"hoverinfo": "skip"}
     if points.hover:
-        hover = {"hoverinfo": "text", "hovertext": [html.escape(text) for text in points.hover]}
+        hover = {"hoverinfo": "text", "hovertext": [html.escape(text, quote=False) for text in points.hover]}
     return {
         "type": "scatter3d",
         "mode": "markers",
@@ -249,7 +249,7 @@ def _title(scene: Scene) -> str:
     stretched = scene.vertical_exaggeration != 1
     proportions = f"heights × {scene.vertical_exaggeration:g}" if stretched else "true proportions"
     note = " · ".join(filter(None, [scene.note, proportions, "drag to turn, scroll to come nearer"]))
-    return f"<b>{html.escape(scene.title)}</b><br><sup>{html.escape(note)}</sup>"
+    return f"<b>{html.escape(scene.title, quote=False)}</b><br><sup>{html.escape(note, quote=False)}</sup>"
 
 
 def _camera(view: View, ranges_m: FloatArray) -> dict[str, Any]:
@@ -289,7 +289,7 @@ def _annotations(scene: Scene, view: View) -> list[dict[str, Any]]:
     return [
         {
             "name": layer.name,
-            "text": html.escape(label.text),
+            "text": html.escape(label.text, quote=False),
             **dict(zip("xyz", label.at_m.round(2).tolist(), strict=True)),
             "ax": float(round(offset[0])),
             "ay": float(-round(offset[1])),

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from geometry.beams import unit_vector
 from geometry.gates import Probe
 from reconstruct.field import synthesise
-from reconstruct.flight import Sampling, reach_m, subgrid_std
+from reconstruct.flight import Sampling, reach_m, subgrid_root
 from reconstruct.monte_carlo import (
     Air,
     Scene,
@@ -106,7 +106,7 @@ def bench_turbulent() -> None:
     print(f"memory while it is made: {tracemalloc.get_traced_memory()[1] / 1e6:.0f} MB")
     tracemalloc.stop()
     start = time.perf_counter()
-    air = Air(field, 0.72, subgrid_std(scene.rays, scene.wind, AIR, field))
+    air = Air(field, 0.72, subgrid_root(*scene, AIR, field.cut_per_m))
     print(f"share of the subgrid eddies in 60 rays: {time.perf_counter() - start:.2f} s")
     sine_s = best_s(lambda: np.sin(np.linspace(0.0, 100.0, 3_000_000)), 3)
     settings = Settings(sampling=Sampling(probe_points=5, sweep_points=1))

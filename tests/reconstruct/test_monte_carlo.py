@@ -1,6 +1,7 @@
 """The judge against closed forms that the packages do not contain, limit cases, and its rules of conduct."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
 from reconstruct.error_draws import draw_pointing
-from reconstruct.flight import Sampling, beams, reach_m, subgrid_std, to_wind_frame
+from reconstruct.flight import Sampling, beams, reach_m, subgrid_root, to_wind_frame
 from reconstruct.monte_carlo import Scene, Settings, scans_in, simulate, simulate_scenes
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
@@ -244,24 +245,31 @@ def test_stare_has_the_variance_that_the_probe_leaves(turbulent):
     assert_agrees(mixed, 0.0)
 
 
-def test_subgrid_part_of_a_ray_is_the_tail_of_its_integral():
-    from reconstruct.field import synthesise
+def subgrid_variance(rays, wind):
+    root = subgrid_root(rays, wind, AIR, np.pi / 10.0)
+    return np.diag(root @ root.T)
 
+
+def test_subgrid_part_of_a_ray_is_the_tail_of_its_integral():
     still = WindState(speed_mps=0.0, from_deg=210.0)
-    field = synthesise(AIR, np.zeros(3), rng=np.random.default_rng(1), spacing_m=10.0)
-    share = subgrid_std(stares(), still, AIR, field) ** 2
-    assert share == pytest.approx(radial_variance(np.pi / 10.0), rel=0.05)
+    assert subgrid_variance(stares(), still) == pytest.approx(radial_variance(np.pi / 10.0), rel=0.03)
 
 
 def test_sweep_and_passing_wind_leave_less_of_the_small_eddies():
-    from reconstruct.field import synthesise
+    azimuth, wind = np.array([80.0, 90.0, 100.0]), WindState(speed_mps=8.0, from_deg=0.0)
+    standing, sweeping = (subgrid_variance(sector(azimuth, swept_deg=turn), wind) for turn in (0.0, 5.0))
+    assert np.all(sweeping < 0.4 * standing)
 
-    field = synthesise(AIR, np.zeros(3), rng=np.random.default_rng(1), spacing_m=10.0)
-    azimuth = np.array([80.0, 90.0, 100.0])
-    wind = WindState(speed_mps=8.0, from_deg=0.0)
-    standing = subgrid_std(sector(azimuth), wind, AIR, field)
-    sweeping = subgrid_std(sector(azimuth, swept_deg=5.0), wind, AIR, field)
-    assert np.all(sweeping < 0.6 * standing)
+
+def test_two_lidars_on_one_line_share_all_small_eddies_and_at_right_angles_none():
+    """Opposite beams over one probe have correlation -1; crossed ones see components that isotropy parts."""
+    still = WindState(speed_mps=0.0, from_deg=210.0)
+    for azimuth, expected in ((180.0, -1.0), (90.0, 0.0)):
+        crossed = replace(stares(), azimuth_deg=np.array([azimuth, 0.0]))
+        crossed = replace(crossed, head_m=-300.0 * unit_vector(crossed.azimuth_deg, np.zeros(2)))
+        root = subgrid_root(crossed, still, AIR, np.pi / 10.0)
+        covariance = root @ root.T
+        assert covariance[0, 1] / covariance[0, 0] == pytest.approx(expected, abs=0.02)
 
 
 def test_cup_reads_more_than_the_mean_wind_by_the_lateral_variance(turbulent):

@@ -166,3 +166,22 @@ def test_subset_of_gains_is_the_prediction_of_the_smaller_scan():
     one_way = turbulence_covariance(dataclasses.replace(rays, back_and_forth=False), wind, AIR, gains=gains)
     np.testing.assert_allclose(one_way[1], turbulence_covariance(small, wind, AIR), rtol=1e-9)
     assert together.shape == (2, 2, 2)
+
+
+def test_clocks_that_differ_by_much_more_than_an_eddy_lives_cut_the_ties_between_lidars():
+    """Beams that cross at a right angle give one component each, whose variances know no clock."""
+    rays, wind = dual(90.0), WindState(10.0, 45.0)
+    together = predict_turbulent(rays, wind, AIR, ErrorSources()).covariance_m2s2
+    apart = predict_turbulent(rays, wind, AIR, ErrorSources(clock_s=3600.0)).covariance_m2s2
+    np.testing.assert_allclose(np.diag(apart), np.diag(together), rtol=1e-6)
+    assert abs(apart[0, 1]) <= abs(together[0, 1])
+
+
+def test_small_clock_difference_changes_the_covariance_by_its_square():
+    rays, wind = dual(63.0), WindState(10.0, 45.0)
+    plain, small, double = (
+        predict_turbulent(rays, wind, AIR, [ErrorSources(), ErrorSources(clock_s=s)]).covariance_m2s2
+        for s in (0.0, 2.0, 4.0)
+    )
+    first, second = np.abs(small - plain).max(), np.abs(double - plain).max()
+    assert 0 < first < second < 4.5 * first

@@ -1,0 +1,81 @@
+"""`lidarplan retrieve CAMPAIGN`: measured or simulated rays to the wind of every scan, and its means."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from planner.commands.options import JsonOption, QuietOption, remark, say, say_json
+
+if TYPE_CHECKING:
+    from planner.analysis import Retrieved
+
+CampaignArgument = Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file.")]
+ResultsOption = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results. [default: the campaign's `output`]")
+]
+RestartOption = Annotated[bool, typer.Option("--restart", help="Forget what an unfinished run has done.")]
+InteractiveOption = Annotated[
+    bool, typer.Option("--interactive", help="Show the unfiltered rays and ask for limits until they are approved.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    app.command("retrieve")(retrieve)
+
+
+def retrieve(
+    campaign: CampaignArgument,
+    out: ResultsOption = None,
+    interactive: InteractiveOption = False,
+    restart: RestartOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Filter, retrieve and average a campaign's rays; write single scans and means as CSV and Parquet."""
+    from planner.analysis import retrieve as run
+    from planner.commands.progress import shown
+    from planner.files.yaml_campaign import load_campaign
+
+    loaded = load_campaign(campaign)
+    if out is not None:
+        loaded = loaded._replace(campaign=loaded.campaign.model_copy(update={"output": out}))
+    if interactive:
+        from planner.commands.ask_limits import asked
+
+        loaded = loaded._replace(campaign=asked(loaded))
+    with shown("retrieving the wind", quiet=quiet) as progress:
+        found = run(loaded, restart=restart, progress=progress)
+    if json:
+        say_json(_document(found))
+        return
+    if found.resumed:
+        remark(f"{found.resumed} parts had been done by an earlier run.", quiet=quiet)
+    _print(found, quiet=quiet)
+    say(str(found.folder))
+
+
+def _print(found: "Retrieved", *, quiet: bool) -> None:
+    from planner.analysis import told
+    from planner.commands.table import print_table
+
+    for scan, steps in found.steps.items():
+        for note in (*found.notes[scan], *map(told, steps)):
+            remark(f"{scan}: {note}", quiet=quiet)
+    for pair, gaps in found.gaps.items():
+        if gaps:
+            rows = [(f"{g.gap_s:g}", str(g.pairs), f"{g.share:.1%}", f"{g.median_gap_s:.2f}") for g in gaps]
+            print_table(f"{pair}, rays paired within a time gap", ("gap s", "pairs", "of the rays", "median s"), rows)
+
+
+def _document(found: "Retrieved") -> dict[str, object]:
+    return {
+        "results": str(found.folder),
+        "filters": {scan: [step._asdict() for step in steps] for scan, steps in found.steps.items()},
+        "gaps": {
+            pair: [{"gap_s": g.gap_s, "pairs": g.pairs, "share": g.share} for g in gaps]
+            for pair, gaps in found.gaps.items()
+        },
+        "means": {f"{period_s:g}": len(table) for period_s, table in found.means.items()},
+    }

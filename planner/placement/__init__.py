@@ -1,0 +1,1 @@
+"""Where to put lidars: what each place allows, which places are best, and why."""

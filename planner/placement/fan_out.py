@@ -1,0 +1,188 @@
+"""Batches of work on this machine's processes or on a dask cluster: the same answers either way, nothing lost.
+
+A batch is a tuple of integers and a pure function of it and of what all batches share; results come back in the order of
+the batches, whoever worked on them. What is done is kept in a file, so that a run that breaks off goes on from there.
+"""
+
+import hashlib
+import os
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from geometry.errors import InputError, UnavailableError
+from planner.output import write_bytes
+
+Batch = tuple[int, ...]
+Work = Callable[[Any, Batch], Any]
+Progress = Callable[[float], None]
+
+# A batch of less than this costs more to hand out than to work on.
+LEAST_BATCH_S = 0.1
+
+# Starting a process and importing numpy and scipy there costs about a second: less work than this stays here.
+WORTH_PROCESSES_S = 3.0
+
+# Hand-outs of one batch before it is given up: each can meet a dying worker.
+RETRIES = 5
+
+# How often what is done is written, in batches.
+SAVE_EVERY = 8
+
+_shared: Any = None  # in a worker process: what all batches share
+
+
+class How(NamedTuple):
+    """Where batches are worked on."""
+
+    scheduler: str | None = None  # address of a dask scheduler, such as tcp://host:8786
+    processes: int | None = None  # default: one for each core; 1: this one
+    checkpoint: Path | None = None  # file that keeps what is done
+    progress: Progress | None = None  # called with the share that is done
+
+
+def run(work: Work, shared: Any, batches: Sequence[Batch], *, how: How | None = None, expected_s: float = 0.0) -> list[Any]:
+    """Work on all batches.
+
+    Parameters
+    ----------
+    work
+        A function of a module: what is shared and the batch -> the result; no state, no randomness.
+    shared
+        What every batch needs; sent once.
+    batches
+        The batches, all different.
+    how
+        Where.
+    expected_s
+        How long all of it takes on one core, about; short work stays in this process.
+
+    Returns
+    -------
+    list
+        Results in the order of the batches.
+
+    Raises
+    ------
+    UnavailableError
+        If a scheduler is named and dask is not installed, or it does not answer.
+
+    Examples
+    --------
+    >>> run(_times, 3, [(1,), (2,)])
+    [3, 6]
+    """
+    chosen = how or How()
+    key = _key(work, shared, batches) if chosen.checkpoint else ""
+    done = _load(chosen.checkpoint, key)
+    rest = [batch for batch in batches if batch not in done]
+    for number, (batch, result) in enumerate(_worked(work, shared, rest, chosen, expected_s), start=1):
+        done[batch] = result
+        if chosen.checkpoint and (number % SAVE_EVERY == 0 or number == len(rest)):
+            _save(chosen.checkpoint, key, done)
+        if chosen.progress:
+            chosen.progress(len(done) / len(batches))
+    return [done[batch] for batch in batches]
+
+
+def _times(shared: int, batch: Batch) -> int:
+    """For the example."""
+    return shared * batch[0]
+
+
+def _worked(
+    work: Work, shared: Any, batches: list[Batch], how: How, expected_s: float
+) -> Iterator[tuple[Batch, Any]]:
+    if how.scheduler is not None:
+        return _on_cluster(work, shared, batches, how.scheduler)
+    processes = how.processes or os.cpu_count() or 1
+    if processes == 1 or len(batches) < 2 or expected_s < WORTH_PROCESSES_S:
+        return ((batch, work(shared, batch)) for batch in batches)
+    return _in_processes(work, shared, batches, processes)
+
+
+def _in_processes(work: Work, shared: Any, batches: list[Batch], processes: int) -> Iterator[tuple[Batch, Any]]:
+    """Results as they come; when a worker dies its batches are handed out again."""
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import get_context
+
+    rest = list(batches)
+    for attempt in range(RETRIES):
+        with ProcessPoolExecutor(
+            min(processes, len(rest)), mp_context=get_context("spawn"), initializer=_receive, initargs=(shared,)
+        ) as pool:
+            futures = {pool.submit(_work_on_shared, work, batch): batch for batch in rest}
+            try:
+                for future in as_completed(futures):
+                    result = future.result()
+                    rest.remove(futures[future])
+                    yield futures[future], result
+            except BrokenProcessPool:
+                if attempt == RETRIES - 1:
+                    raise
+        if not rest:
+            return
+
+
+def _receive(shared: Any) -> None:
+    global _shared
+    _shared = shared
+
+
+def _work_on_shared(work: Work, batch: Batch) -> Any:
+    return work(_shared, batch)
+
+
+def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> Iterator[tuple[Batch, Any]]:
+    """Results as they come from a dask cluster; a batch whose worker dies is worked on by another."""
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise UnavailableError(
+            "--scheduler needs dask, which is not installed: pip install 'lidarplan[cluster]'"
+        ) from None
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise UnavailableError(
+            f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler` and give its tcp:// address"
+        ) from error
+    with client:
+        # not scattered: what is scattered to one worker dies with it
+        sent = client.submit(_give, pickle.dumps(shared), pure=False, retries=RETRIES)
+        futures = {
+            client.submit(_work_on_sent, work, sent, batch, retries=RETRIES, pure=False): batch for batch in batches
+        }
+        for future in as_completed(list(futures)):
+            yield futures[future], future.result()
+
+
+def _give(data: bytes) -> Any:
+    return pickle.loads(data)
+
+
+def _work_on_sent(work: Work, shared: Any, batch: Batch) -> Any:
+    return work(shared, batch)
+
+
+def _key(work: Work, shared: Any, batches: Sequence[Batch]) -> str:
+    """What a checkpoint has to be of: the same work, shared data and batches."""
+    parts = (work.__module__, work.__qualname__, shared, list(batches))
+    return hashlib.sha256(pickle.dumps(parts)).hexdigest()
+
+
+def _load(path: Path | None, key: str) -> dict[Batch, Any]:
+    """What an earlier run has done; nothing if the file is of other work. The file is this program's own."""
+    if path is None or not path.is_file():
+        return {}
+    try:
+        found = pickle.loads(path.read_bytes())
+    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError) as error:
+        raise InputError(f"{path}: the progress file cannot be read ({error}); remove it to start anew") from error
+    return dict(found["done"]) if found["key"] == key else {}
+
+
+def _save(path: Path, key: str, done: dict[Batch, Any]) -> None:
+    write_bytes(path, pickle.dumps({"key": key, "done": done}))

@@ -1,0 +1,131 @@
+"""The numbers of chosen places, from the retrieval core: error at every target, crossing, ranges, wind lost."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.beams import beam_to
+from planner.placement.maps import Look
+from planner.placement.task import Aggregate, Task
+from planner.site import Lidar
+from planner.wind_climate import error_sources
+from reconstruct.beam_table import Criterion, condensed
+from reconstruct.prediction import predict_linear
+from reconstruct.rays import Rays
+from reconstruct.uncertainty import ErrorSources
+from reconstruct.wind import WindState
+
+
+class Numbers(NamedTuple):
+    """What a set of lidars does at each target."""
+
+    speed_std_mps: FloatArray  # (target,) linear tier, root mean square over the climate
+    direction_std_deg: FloatArray  # (target,)
+    opening_deg: FloatArray  # (target,) in plan, 0 to 180, of those two that cross best; NaN for one lidar
+    range_m: FloatArray  # (target, lidar), those that stand first
+    azimuth_deg: FloatArray  # (target, lidar)
+    elevation_deg: FloatArray  # (target, lidar)
+    lost_share: FloatArray  # (target,) of the wanted wind, to wakes, of the lidar that loses most
+    vector_std_mps: FloatArray  # (target,) of both components together
+
+    def value(self, criterion: Criterion, aggregate: Aggregate) -> float:
+        """What a search minimises, at these places."""
+        each = {"vector": self.vector_std_mps, "speed": self.speed_std_mps, "direction": self.direction_std_deg}[criterion]
+        return float(each.max() if aggregate == "worst" else np.sqrt(np.mean(each**2)))
+
+
+def numbers_of(task: Task, looks: Sequence[Look]) -> Numbers:
+    """Work out the numbers of lidars that stand and of those that are placed.
+
+    Parameters
+    ----------
+    task
+        What they are for.
+    looks
+        One place each: the lidars that stand, then those that are placed.
+
+    Returns
+    -------
+    Numbers
+        Errors by `predict_linear`, the retrieval core, at every target and state of its climate.
+    """
+    lidars = [*task.fixed, *[task.pattern] * (len(looks) - len(task.fixed))]
+    sources = [error_sources(lidar, lidar.radial_speed_noise_mps) for lidar in lidars]
+    heads = np.concatenate([each.local_m for each in looks])
+    errors = [_errors(task, number, heads, sources) for number in range(len(task.targets))]
+    azimuth = np.concatenate([each.azimuth_deg for each in looks], axis=1)
+    return Numbers(
+        speed_std_mps=np.array([speed for speed, _, _ in errors]),
+        direction_std_deg=np.array([direction for _, direction, _ in errors]),
+        opening_deg=_opening_deg(azimuth),
+        range_m=np.concatenate([each.range_m for each in looks], axis=1),
+        azimuth_deg=azimuth,
+        elevation_deg=np.concatenate([each.elevation_deg for each in looks], axis=1),
+        lost_share=np.concatenate([each.lost_share for each in looks], axis=1).max(axis=1),
+        vector_std_mps=np.array([vector for _, _, vector in errors]),
+    )
+
+
+def rays_at(task: Task, number: int, heads_m: FloatArray) -> Rays:
+    """Rays of one retrieval at a target, seen from it: one of each lidar, or those of the sector of one."""
+    relative = heads_m - task.local_targets_m[number]
+    beam = beam_to(-relative)
+    offsets = task.offsets_deg if len(heads_m) == 1 else np.zeros(1)
+    which = np.repeat(np.arange(len(heads_m)), offsets.size)
+    return Rays(
+        azimuth_deg=beam.azimuth_deg[which] + np.tile(offsets, len(heads_m)),
+        elevation_deg=beam.elevation_deg[which],
+        range_m=beam.range_m[which],
+        head_m=relative[which],
+        lidar=which,
+        time_s=np.zeros(which.size),
+        duration_s=np.ones(which.size),
+        swept_azimuth_deg=np.zeros(which.size),
+        probes=(task.probe,) * len(heads_m),
+        period_s=1.0,
+    )
+
+
+def _errors(
+    task: Task, number: int, heads_m: FloatArray, sources: list[ErrorSources]
+) -> tuple[float, float, float]:
+    """Standard deviation of speed [m/s], direction [deg] and vector [m/s] at one target over its climate."""
+    rays, climate, like = rays_at(task, number, heads_m), task.climates[number], task.states[number]
+    squares = condensed(climate, like, "speed")
+    parts = np.array([_along_across(rays, state, sources) for state in squares.states(like)])
+    speed, side = squares.mean(parts[:, 0]), squares.mean(parts[:, 1])
+    inverse = condensed(climate, like, "direction")
+    turned = [_along_across(rays, state, sources)[1] / state.speed_mps**2 for state in inverse.states(like)]
+    return float(np.sqrt(speed)), float(np.degrees(np.sqrt(inverse.mean(turned)))), float(np.sqrt(speed + side))
+
+
+def _along_across(rays: Rays, state: WindState, sources: list[ErrorSources]) -> tuple[float, float]:
+    """Variance of the retrieved wind along and across the wind [m²/s²]."""
+    covariance = predict_linear(rays, state, sources).covariance_m2s2
+    along = np.array(state.uv_mps) / state.speed_mps
+    across = np.array([-along[1], along[0]])
+    return float(along @ covariance @ along), float(across @ covariance @ across)
+
+
+def _opening_deg(azimuth_deg: FloatArray) -> FloatArray:
+    """(target,) angle in plan of those two beams (target, lidar) that cross nearest to a right angle."""
+    if azimuth_deg.shape[1] < 2:
+        return np.full(len(azimuth_deg), np.nan)
+    first, second = np.triu_indices(azimuth_deg.shape[1], 1)
+    apart = np.abs((azimuth_deg[:, first] - azimuth_deg[:, second] + 180.0) % 360.0 - 180.0)
+    best = np.argmin(np.abs(apart - 90.0), axis=1)
+    return np.asarray(apart[np.arange(len(apart)), best])
+
+
+def lidar_names(task: Task) -> tuple[str, ...]:
+    """Names of the lidars of a set: those that stand, then those that are placed, numbered where there are several."""
+    placed = [task.pattern] if task.count == 1 else []
+    several = [f"lidar {number}" for number in range(1, task.count + 1)] if task.count > 1 else []
+    return (*(lidar.name for lidar in task.fixed), *(lidar.name for lidar in placed), *several)
+
+
+def lidars_of(task: Task) -> tuple[Lidar, ...]:
+    """The lidars of a set: those that stand, then copies of the pattern."""
+    return (*task.fixed, *[task.pattern] * task.count)

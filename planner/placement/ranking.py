@@ -1,0 +1,222 @@
+"""From a task to ranked places: the grid, the search, the refinement, the numbers that are shown, and why."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import InputError
+from planner.placement import search
+from planner.placement.fan_out import How
+from planner.placement.infeasible import refusal
+from planner.placement.maps import CRITERIA, Grid, Look, check_terrain, look, of_lidar, single_variance, standing_m, table_of
+from planner.placement.numbers import Numbers, numbers_of
+from planner.placement.refine import WORTH, Improve, SoftCost, binding, refined
+from planner.placement.task import Task
+from planner.wind_climate import error_sources
+from reconstruct.beam_table import BeamTable
+
+APART_CELLS = 4.0  # two places this many cells of the grid apart are different ones
+WHAT = {"vector": "wind vector", "speed": "wind speed", "direction": "wind direction"}
+MOST = 5  # distinct optima
+STARTS = 12  # beginnings of sets of more than two
+
+
+class Ranked(NamedTuple):
+    """One set of places for the lidars that are placed."""
+
+    rank: int  # from 1; 0 for the declared places
+    positions_m: FloatArray  # (lidar, 3) easting, northing, height of the head
+    value: float  # what was minimised, in the criterion's unit, soft cost included
+    numbers: Numbers
+    binds: tuple[str, ...]  # constraints that keep it from being better; of the declared places: that they break
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """What a search found."""
+
+    task: Task
+    grid: Grid
+    seen: Look  # of every candidate
+    error: FloatArray  # (candidate,) best error that a lidar there can be part of, inf where none
+    ranked: tuple[Ranked, ...]
+    declared: Ranked | None  # where the site has the lidars now; None where it has none to compare
+    why: str  # the best against the declared
+
+
+def place(task: Task, grid: Grid, *, how: How | None = None, cost: SoftCost | None = None, most: int = MOST) -> Placement:
+    """Find the best places.
+
+    Parameters
+    ----------
+    task
+        What is placed, for which targets.
+    grid
+        Candidates to begin with; the best are refined between them.
+    how
+        Where the work is done, and who hears of its progress.
+    cost
+        Soft cost of a place in the criterion's unit, such as the distance to a road times what a metre is worth.
+    most
+        How many distinct optima.
+
+    Returns
+    -------
+    Placement
+        Ranked, best first.
+
+    Raises
+    ------
+    InputError
+        If no place keeps to every constraint: with the constraint that leaves none, and how much it must give; or if a
+        target lies outside the terrain.
+    """
+    check_terrain(task)
+    seen = look(task, standing_m(task, grid.places_m))
+    improve = Improve(task, fixed_tables(task), grid.spacing_m, cost or _free)
+    error, sets = _searched(improve, seen, how, most)
+    if not len(sets.members):
+        raise InputError(refusal(task, seen, [of_lidar(task, lidar) for lidar in task.fixed]))
+    found = [refined(improve, seen.positions_m[members, :2]) for members in sets.members]
+    apart = _apart(found, APART_CELLS / 2 * grid.spacing_m)
+    ranked = tuple(_ranked(improve, *one, rank=rank) for rank, one in enumerate(apart, start=1))
+    declared = _declared(improve)
+    return Placement(task, grid, seen, error, ranked, declared, _why(task, ranked[0], declared))
+
+
+def fixed_tables(task: Task) -> list[BeamTable]:
+    """What the lidars that stand contribute, one candidate each."""
+    return [
+        table_of(task, of_lidar(task, lidar), sources=error_sources(lidar, lidar.radial_speed_noise_mps))
+        for lidar in task.fixed
+    ]
+
+
+def _free(places_m: FloatArray) -> FloatArray:
+    return np.zeros(len(places_m))
+
+
+def _searched(improve: Improve, seen: Look, how: How | None, most: int) -> tuple[FloatArray, search.Sets]:
+    """(candidate,) best error that a lidar there can be part of, and the best sets."""
+    task, places = improve.task, seen.positions_m[:, :2]
+    apart, cost = APART_CELLS * improve.spacing_m, improve.cost(places)
+    if task.count == 1:
+        error = improve.values([], seen)
+        return error, search.distinct_singles(error, places, apart_m=apart, most=most)
+    table, opening = table_of(task, seen), task.limits.least_opening_deg
+    if improve.fixed:
+        error = improve.values([], seen)
+        starts = search.distinct_singles(error, places, apart_m=apart, most=STARTS)
+    else:
+        error, starts = _pairs(task, table, cost, places, apart, how, most if task.count == 2 else STARTS)
+        if task.count == 2:
+            return error, starts
+    members: IntArray = starts.members if len(starts.members) else np.empty((1, 0), dtype=np.intp)
+    if not improve.fixed and not len(starts.members):
+        return error, search.Sets(np.empty((0, task.count), dtype=np.intp), np.empty(0))
+    sets = search.best_sets(
+        table, improve.fixed, members, count=task.count, cost=cost, least_opening_deg=opening, aggregate=task.aggregate
+    )
+    return error, search.Sets(sets.members[:most], sets.value[:most])
+
+
+def _pairs(
+    task: Task, table: BeamTable, cost: FloatArray, places: FloatArray, apart: float, how: How | None, most: int
+) -> tuple[FloatArray, search.Sets]:
+    """Best partner's value of every candidate, and the best distinct pairs, of those that see every target."""
+    kept = np.flatnonzero(table.seen.all(axis=0))
+    error = np.full(table.candidates, np.inf)
+    if not kept.size:
+        return error, search.Sets(np.empty((0, 2), dtype=np.intp), np.empty(0))
+    least = np.sin(np.radians(task.limits.least_opening_deg)) ** 2
+    tables = search.PairTables(table.take(kept), cost[kept], float(least), task.aggregate)
+    value, partner = search.best_partners(tables, how=how)
+    found = search.distinct_pairs(value, partner, places[kept], apart_m=apart, most=most)
+    error[kept] = value
+    return error, search.Sets(kept[found.members], found.value)
+
+
+Found = tuple[FloatArray, float]  # places (lidar, 2) and their value
+
+
+def _apart(found: Sequence[Found], apart_m: float) -> list[Found]:
+    """Best first; of those that refinement has brought to one place, the best."""
+    kept: list[Found] = []
+    for places, value in sorted(found, key=lambda item: item[1]):
+        if not any(search.near(places[None], other, apart_m)[0] for other, _ in kept):
+            kept.append((places, value))
+    return kept
+
+
+def _ranked(improve: Improve, places_m: FloatArray, value: float, *, rank: int) -> Ranked:
+    """One set with its numbers, the constraint that binds, and its line."""
+    task = improve.task
+    positions = np.concatenate([standing_m(task, place) for place in places_m])
+    numbers = numbers_of(task, [*(of_lidar(task, lidar) for lidar in task.fixed), *(look(task, one[None]) for one in positions)])
+    binds = binding(improve, places_m, value)
+    return Ranked(rank, positions, value, numbers, binds, _line(task, positions, numbers, binds))
+
+
+def _declared(improve: Improve) -> Ranked | None:
+    """The lidars where the site has them, judged alike, whether or not they keep to the constraints."""
+    task = improve.task
+    if not task.replaced:
+        return None
+    looks = [of_lidar(task, lidar) for lidar in task.replaced]
+    numbers = numbers_of(task, [*(of_lidar(task, lidar) for lidar in task.fixed), *looks])
+    positions = np.array([lidar.position for lidar in task.replaced], dtype=np.float64)
+    broken = [name for one in looks for name, slack in one.slack.items() if not (slack >= 0.0).all()]
+    value = numbers.value(task.criterion, task.aggregate) + float(improve.cost(positions[:, :2]).sum())
+    return Ranked(0, positions, value, numbers, tuple(dict.fromkeys(broken)), _line(task, positions, numbers, ()))
+
+
+def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str, ...]) -> str:
+    """What one set is, in a line."""
+    spots = " and ".join(f"E {east:.0f} N {north:.0f}" for east, north, _ in positions)
+    worst = int(np.argmax(numbers.speed_std_mps))
+    parts = [f"{spots}: speed {numbers.speed_std_mps.max():.4f} m/s, direction {numbers.direction_std_deg.max():.3f}°"]
+    if len(task.targets) > 1:
+        parts[0] += f" at the worst target ({task.targets[worst]} for speed)"
+    if np.isfinite(numbers.opening_deg).all():
+        parts.append(f"opening {_span(numbers.opening_deg, '°')}")
+    placed = slice(len(task.fixed), None)
+    parts.append(f"range {_span(numbers.range_m[:, placed], ' m')}")
+    parts.append(f"elevation {_span(numbers.elevation_deg[:, placed], '°', 1)}")
+    parts.append("bound by " + (", ".join(CRITERIA[name][1] for name in binds) if binds else "nothing: the error is least here"))
+    return ", ".join(parts)
+
+
+def _span(values: FloatArray, unit: str, digits: int = 0) -> str:
+    low, high = f"{float(np.min(values)):.{digits}f}", f"{float(np.max(values)):.{digits}f}"
+    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+
+
+def _why(task: Task, best: Ranked, declared: Ranked | None) -> str:
+    """What the best does better than the declared, and by what."""
+    if declared is None:
+        return "the site has no lidars to compare with"
+    names = " and ".join(lidar.name for lidar in task.replaced)
+    change = best.value / declared.value - 1.0
+    verdict = f"{-change:.1%} smaller" if change < -WORTH else "as small" if change <= WORTH else f"{change:.1%} larger"
+    old, new = declared.numbers, best.numbers
+    reasons = [
+        f"the error of the {WHAT[task.criterion]} at {'the worst target' if len(task.targets) > 1 else task.targets[0]} is "
+        f"{verdict} than with {names} where declared" if change < -WORTH or change > WORTH
+        else f"the error of the {WHAT[task.criterion]} is {verdict} as with {names} where declared",
+        f"speed {new.speed_std_mps.max():.4f} against {old.speed_std_mps.max():.4f} m/s",
+        f"direction {new.direction_std_deg.max():.3f} against {old.direction_std_deg.max():.3f}°",
+    ]
+    if np.isfinite(new.opening_deg).all() and np.isfinite(old.opening_deg).all():
+        reasons.append(f"the beams cross at {_span(new.opening_deg, '°')} instead of {_span(old.opening_deg, '°')}")
+    placed = slice(len(task.fixed), None)
+    reasons.append(
+        f"at ranges of {_span(new.range_m[:, placed], ' m')} instead of {_span(old.range_m[:, placed], ' m')} and elevations of "
+        f"{_span(new.elevation_deg[:, placed], '°', 1)} instead of {_span(old.elevation_deg[:, placed], '°', 1)}"
+    )
+    if declared.binds:
+        reasons.append(f"the declared place breaks: {', '.join(CRITERIA[name][1] for name in declared.binds)}")
+    return "; ".join(reasons)

@@ -1,0 +1,150 @@
+"""A filter that follows the conditions: outliers of radial speed and CNR against their own neighbourhood.
+
+Fixed limits cut good rays when the air is clean and let noise pass when it is not. Here each ray is measured
+against the others of its time: how far its radial speed is from the median of its own direction, and how far
+its CNR is below the median, both in robust standard deviations of the window (1.4826 times the median
+absolute deviation). What lies outside the ellipse is an outlier. The idea of judging a ray by the density of
+its neighbours in the plane of radial speed and CNR, normalised over a short interval, is that of Beck and
+Kühn (2017, Remote Sens. 9, 561, doi:10.3390/rs9060561); median and MAD stand for their histogram, as in the
+moving-window filters that Alcayaga (2020, Atmos. Meas. Tech. 13, 6237-6254, doi:10.5194/amt-13-6237-2020)
+compares with. CNR counts on its low side only: a strong echo is a hard target, which limits are for.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import InputError
+from reconstruct.filters import Filtered, keep
+
+MAD_TO_STD = 1.4826  # of a normal distribution: 1 / 0.6745 (Huber & Ronchetti 2009, Robust Statistics, 5.1)
+WINDOW_SCANS = 50  # ten minutes of the reference study's 12 s scans
+DISTANCE = 5.0  # robust standard deviations: 4e-6 of normal rays lie beyond it in two dimensions
+LEAST_SPEED_STD_MPS = 0.1  # a lidar's own noise: a calm laminar hour must not make outliers of good rays
+LEAST_CNR_STD_DB = 0.5
+
+
+class Window(NamedTuple):
+    """How the automatic filter looks at the data."""
+
+    scans: int = WINDOW_SCANS
+    distance: float = DISTANCE
+    least_speed_std_mps: float = LEAST_SPEED_STD_MPS
+    least_cnr_std_db: float = LEAST_CNR_STD_DB
+
+
+DEFAULT = Window()
+
+
+def filter_outliers(
+    radial_speed_mps: FloatArray, cnr_db: FloatArray | None = None, *, window: Window = DEFAULT
+) -> Filtered:
+    """Take away the rays that do not belong to their neighbourhood.
+
+    Parameters
+    ----------
+    radial_speed_mps : numpy.ndarray
+        (scan, ray) in the order of time, a column for each direction [m/s]; NaN where missing.
+    cnr_db : numpy.ndarray, optional
+        (scan, ray) [dB]; where it is NaN, or not given, the radial speed alone counts.
+    window : Window
+        Length in scans, and how far is too far.
+
+    Returns
+    -------
+    Filtered
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, or the window has fewer than 3 scans.
+
+    Notes
+    -----
+    Medians and deviations are taken over windows that overlap by half, and interpolated in time between the
+    windows' middles. With s the robust standard deviations, a ray is kept where
+    (Δv/s_v)² + (min(ΔCNR, 0)/s_c)² <= distance².
+
+    Examples
+    --------
+    >>> speed = 5.0 + 0.2 * np.sin(np.arange(60.0)).reshape(20, 3)
+    >>> speed[7, 1] = -22.0
+    >>> np.argwhere(np.isnan(filter_outliers(speed).values)).tolist()
+    [[7, 1]]
+    """
+    speed = np.asarray(radial_speed_mps, dtype=float)
+    if speed.ndim != 2 or (cnr_db is not None and np.shape(cnr_db) != speed.shape):
+        raise InputError(
+            f"radial speeds {speed.shape} and CNR {np.shape(cnr_db)} came: both have to be (scan, ray)"
+        )
+    if window.scans < 3:
+        raise InputError(f"a window of {window.scans} scans came: 3 or more are needed for a median")
+    distance = np.square(_deviation(speed, window.scans, window.least_speed_std_mps))
+    if cnr_db is not None:
+        faint = np.minimum(_deviation(np.asarray(cnr_db, float), window.scans, window.least_cnr_std_db), 0.0)
+        distance = distance + np.square(np.where(np.isfinite(faint), faint, 0.0))
+    return keep(speed, distance <= window.distance**2, "automatic")
+
+
+class Agreement(NamedTuple):
+    """How the automatic filter and fixed limits agree, in rays."""
+
+    kept_by_both: int
+    kept_by_limits_only: int
+    kept_by_automatic_only: int
+    kept_by_neither: int
+
+
+def compare_filters(before: FloatArray, limits: FloatArray, automatic: FloatArray) -> Agreement:
+    """Count how two filtered versions of the same rays differ.
+
+    Examples
+    --------
+    >>> before = np.array([1.0, 2.0, 3.0])
+    >>> compare_filters(before, np.array([1.0, 2.0, np.nan]), np.array([1.0, np.nan, np.nan]))
+    Agreement(kept_by_both=1, kept_by_limits_only=1, kept_by_automatic_only=0, kept_by_neither=1)
+    """
+    there, by_limits, by_itself = (np.isfinite(values) for values in (before, limits, automatic))
+    parts = (by_limits & by_itself, by_limits & ~by_itself, ~by_limits & by_itself, ~by_limits & ~by_itself)
+    return Agreement(*(int(np.count_nonzero(part & there)) for part in parts))
+
+
+def _deviation(values: FloatArray, scans: int, least: float) -> FloatArray:
+    """(scan, ray) distance from the neighbourhood's median in its robust standard deviations."""
+    count = len(values)
+    starts = _starts(count, scans)
+    medians = np.stack([_median(values[start : start + scans]) for start in starts])  # (window, ray)
+    middles = starts + (np.minimum(starts + scans, count) - starts - 1) / 2
+    centre = _between(middles, medians, count)
+    off = values - centre
+    spread = [_median(np.abs(off[start : start + scans]).reshape(-1, 1))[0] for start in starts]
+    scale = np.maximum(MAD_TO_STD * _between(middles, np.array(spread)[:, None], count), least)
+    return np.asarray(off / scale)
+
+
+def _starts(count: int, scans: int) -> FloatArray:
+    """First scans of windows that overlap by half; the last one ends with the data."""
+    if count <= scans:
+        return np.zeros(1, dtype=np.intp)
+    return np.unique(np.append(np.arange(0, count - scans, max(scans // 2, 1)), count - scans))
+
+
+def _between(middles: FloatArray, values: FloatArray, count: int) -> FloatArray:
+    """(scan, column) values at windows' middles, interpolated over the scans; windows without data are passed over."""
+    out = np.full((count, values.shape[1]), np.nan)
+    scan = np.arange(count)
+    for column, known in enumerate(np.isfinite(values).T):
+        if np.any(known):
+            out[:, column] = np.interp(scan, middles[known], values[known, column])
+    return out
+
+
+def _median(values: FloatArray) -> FloatArray:
+    """(column,) median of what is there; NaN where nothing is (numpy's nanmedian warns there)."""
+    ordered = np.sort(values, axis=0)  # NaN last
+    count: BoolArray | FloatArray = np.count_nonzero(np.isfinite(values), axis=0)
+    low, high = np.maximum((count - 1) // 2, 0), count // 2
+    column = np.arange(values.shape[1])
+    middle = (ordered[low, column] + ordered[np.minimum(high, len(values) - 1), column]) / 2
+    return np.where(count > 0, middle, np.nan)

@@ -1,0 +1,154 @@
+"""What a whole campaign of sector scans would show: every state of its climate, all errors, and the
+regression.
+
+Errors that stay for the campaign (heading, levelling, position, calibration) do not scatter its points. They
+tilt and shift the line through them, by an amount that is known in size only: `slope_std` and
+`direction_offset_std_deg`.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from reconstruct.climate import Climate
+from reconstruct.persistence import random_variance
+from reconstruct.rays import Rays
+from reconstruct.regression import DirectionRegression, SpeedRegression, regress_direction, regress_speed
+from reconstruct.retrieval import gain, rows
+from reconstruct.spectra import Turbulence
+from reconstruct.ten_minute import AVERAGING_S, Reference, TenMinute, predict_ten_minute
+from reconstruct.uncertainty import ErrorSources, mean_errors_mps, ray_errors
+from reconstruct.wind import WindState
+
+
+class Campaign(NamedTuple):
+    """Prediction for a campaign; (...) is the axis of sector sizes."""
+
+    means: list[TenMinute]  # one a state
+    speed: SpeedRegression
+    direction: DirectionRegression
+    slope_std: FloatArray  # (...) of the slope, from errors that stay for the campaign
+    direction_offset_std_deg: FloatArray  # (...) of the mean direction, from the same
+
+
+def predict_campaign(
+    rays: Rays,
+    climate: Climate,
+    turbulence: Turbulence,
+    *,
+    like: WindState,
+    sources: ErrorSources | Sequence[ErrorSources] | None = None,
+    gains: FloatArray | None = None,
+    reference: Reference = "scalar",
+    averaging_s: float = AVERAGING_S,
+    scan_share: float = 1.0,
+    sweep: bool = True,
+) -> Campaign:
+    """Predict the ten-minute means of every state of a climate and the regression against the mast.
+
+    Parameters
+    ----------
+    rays
+        Rays of one scan.
+    climate
+        States with weights.
+    turbulence
+        Model, intensity and length, the same in all states.
+    like
+        Everything of the wind but speed and direction: shear, height, vertical wind, gradient.
+    sources
+        Errors of the lidars; none without.
+    gains
+        (size, 2, ray) fits, see `ten_minute.subset_gains`; without it the whole scan.
+    reference, averaging_s, scan_share, sweep
+        See `ten_minute.predict_ten_minute`.
+
+    Returns
+    -------
+    Campaign
+
+    Examples
+    --------
+    >>> from geometry.gates import Probe
+    >>> from reconstruct.climate import listed_climate
+    >>> azimuth = np.arange(-29.0, 30.0, 2.0)
+    >>> scan = Rays(azimuth_deg=azimuth, elevation_deg=np.zeros(30), range_m=np.full(30, 1000.0),
+    ...     head_m=np.tile([0.0, -1000.0, 0.0], (30, 1)), lidar=np.zeros(30, int),
+    ...     time_s=0.4 * np.arange(30) + 0.2,
+    ...     duration_s=np.full(30, 0.4), swept_azimuth_deg=np.full(30, 2.0), probes=(Probe(200, 256),),
+    ...     period_s=12.0)
+    >>> states = listed_climate([6.0, 10.0], directions_deg=[(150.0, 210.0)], directions=2)
+    >>> shown = predict_campaign(scan, states, Turbulence(0.09, 170.0), like=WindState(8.0, 0.0),
+    ...     sources=ErrorSources(radial_speed_mps=0.1, radial_speed_relative=0.01))
+    >>> round(float(shown.speed.slope), 2), round(float(shown.slope_std), 3)
+    (1.0, 0.01)
+    """
+    fits = gain(rows(rays.azimuth_deg, rays.elevation_deg)) if gains is None else gains
+    states = climate.states(like)
+    means = []
+    for state in states:
+        random = 0.0 if sources is None else random_variance(rays, state, sources)
+        means.append(
+            predict_ten_minute(
+                rays,
+                state,
+                turbulence,
+                gains=fits,
+                random_m2s2=random,
+                mean_error_mps=np.sum(list(mean_errors_mps(fits, rays, state).values()), axis=0),
+                reference=reference,
+                averaging_s=averaging_s,
+                scan_share=scan_share,
+                sweep=sweep,
+            )
+        )
+    slope_std, offset_std = _persistent(rays, climate, states, means, fits, sources)
+    speed, direction = regress_speed(climate, means), regress_direction(climate, means)
+    return Campaign(means, speed, direction, slope_std, offset_std)
+
+
+def _persistent(
+    rays: Rays,
+    climate: Climate,
+    states: list[WindState],
+    means: list[TenMinute],
+    fits: FloatArray,
+    sources: ErrorSources | Sequence[ErrorSources] | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Standard deviation of slope and mean direction over what the errors that stay may be, to first order.
+
+    With a = E[mast · lidar]/E[lidar²] a change d of the lidar changes a by E[(mast - 2 a lidar) d]/E[lidar²].
+    """
+    shape = fits.shape[:-2]
+    if sources is None:
+        return np.zeros(shape), np.zeros(shape)
+    along, across = _shifts(rays, states, fits, sources)  # (state, draw, ...)
+    slope = regress_speed(climate, means).slope
+    lidar = np.stack([mean.lidar_mean_mps for mean in means])
+    mast = np.stack([mean.reference_mean_mps for mean in means])
+    variance = np.stack([mean.lidar_variance_m2s2 for mean in means])
+    square = np.tensordot(climate.weight, lidar**2 + variance, axes=1)
+    change = np.tensordot(climate.weight, (mast - 2 * slope * lidar)[:, None] * along, axes=1) / square
+    offset = np.tensordot(climate.weight, across, axes=1)
+    return np.sqrt(np.sum(change**2, axis=0)), np.sqrt(np.sum(offset**2, axis=0))
+
+
+def _shifts(
+    rays: Rays, states: list[WindState], fits: FloatArray, sources: ErrorSources | Sequence[ErrorSources]
+) -> tuple[FloatArray, FloatArray]:
+    """Change of speed [m/s] and direction [degrees], (state, draw, ...), for one std of each draw."""
+    along, across = [], []
+    for state in states:
+        downwind = state.uv_mps / state.speed_mps if state.speed_mps > 0 else np.zeros(2)
+        right = np.array([downwind[1], -downwind[0]])  # a wind turned clockwise has grown to the right
+        shared = [
+            np.where(rays.lidar == lidar, error.response_mps * np.sqrt(error.correlation), 0.0)
+            for error in ray_errors(rays, state, sources)
+            for lidar in range(len(rays.probes))
+        ]
+        moved = np.moveaxis(fits @ np.reshape(shared, (-1, rays.count)).T, -1, 0)  # (draw, ..., 2)
+        along.append(moved @ downwind)
+        across.append(np.degrees(moved @ right) / max(state.speed_mps, 1e-9))
+    return np.stack(along), np.stack(across)

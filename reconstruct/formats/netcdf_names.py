@@ -1,0 +1,117 @@
+"""The names under which netCDF files of Doppler lidars keep their quantities, and their times."""
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from geometry.errors import InputError
+from reconstruct.formats.text import seconds_delta
+from reconstruct.records import TimeArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Each quantity: names of variables, most telling first, then standard names.
+TIME = ("time", "timestamp", "time_offset")
+AZIMUTH = ("azimuth", "azimuth_angle", "sensor_azimuth_angle", "ray_azimuth_angle")
+ELEVATION = ("elevation", "elevation_angle", "sensor_elevation_angle", "ray_elevation_angle")
+RANGE = ("range", "range_gate", "gate_range", "distance", "radial_distance", "projection_range_coordinate")
+SPEED = (
+    "radial_wind_speed",
+    "radial_velocity",
+    "velocity",
+    "doppler_velocity",
+    "VEL",
+    "VR",
+    "radial_speed",
+    "v",
+    "dv",
+    "radial_velocity_of_scatterers_away_from_instrument",
+    "radial_velocity_of_scatterers_toward_instrument",
+)
+CNR = ("cnr", "CNR", "carrier_to_noise_ratio", "snr", "SNR", "signal_to_noise_ratio")
+INTENSITY = ("intensity",)
+WIDTH = ("doppler_spectrum_width", "spectrum_width", "spectral_width", "WIDTH", "dispersion")
+QUALITY = ("radial_wind_speed_ci", "radial_wind_speed_status", "quality")
+DURATION = ("ray_accumulation_time", "accumulation_time", "ray_duration")
+SWEEP = ("ray_sweep_number",)
+
+_SINCE = re.compile(
+    r"(?P<unit>\w+)\s+since\s+(?P<date>\d{4}-\d{1,2}-\d{1,2})"
+    r"(?:[T ]+(?P<clock>\d{1,2}:\d{2}(?::\d{2}(?:\.\d+)?)?))?"
+)
+
+_SECONDS = {
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "ms": 1e-3,
+    "milliseconds": 1e-3,
+    "minutes": 60.0,
+    "hours": 3600.0,
+    "days": 86400.0,
+    "microseconds": 1e-6,
+    "nanoseconds": 1e-9,
+}
+
+
+def find(data: "xr.Dataset", names: tuple[str, ...]) -> str | None:
+    """Name of the first variable that is there under one of these names, or with one of them as its standard
+    name.
+    """
+    for name in names:
+        if name in data.variables:
+            return name
+    for variable in data.variables:
+        if data[variable].attrs.get("standard_name") in names:
+            return str(variable)
+    return None
+
+
+def times(data: "xr.Dataset", root: dict[str, Any], path: Path) -> TimeArray:
+    """(ray,) UTC of the file's times; NaT where it has none.
+
+    Raises
+    ------
+    InputError
+        If the file does not say since when it counts.
+    """
+    variable = data[find(data, TIME)]
+    values = np.asarray(variable)
+    if values.dtype.kind in "SUO":
+        return np.asarray(
+            pd.to_datetime(values.astype(str), utc=True).tz_localize(None), dtype="datetime64[ns]"
+        )
+    reference = (
+        data["time_reference"].values if "time_reference" in data.variables else root.get("time_reference")
+    )
+    units = str(variable.attrs.get("units", ""))
+    found = _SINCE.match(units)
+    if found is None and reference is not None:
+        found = _SINCE.match(f"{units.split()[0] if units.split() else 'seconds'} since {_text(reference)}")
+    if found is None or found["unit"] not in _SECONDS:
+        raise InputError(
+            f"{path}: the times count in {units!r}: 'seconds since 2021-06-30T15:20:22Z' or the like is "
+            "needed"
+        )
+    year, month, day = found["date"].split("-")
+    hour, _, rest = (found["clock"] or "00:00").partition(":")
+    start = np.datetime64(f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest}", "ns")
+    seconds = values.astype(float) * _SECONDS[found["unit"]]
+    known = np.isfinite(seconds)
+    return np.where(known, start + seconds_delta(np.where(known, seconds, 0.0)), np.datetime64("NaT", "ns"))
+
+
+def to_number(value: object) -> int:
+    """A file's number as an integer; 0 where it has none or it is no number."""
+    found = re.fullmatch(r"\s*(\d+)\s*", str(value))
+    return int(found[1]) if found else 0
+
+
+def _text(value: object) -> str:
+    item = np.ravel(np.asarray(value))[0]
+    return item.decode() if isinstance(item, bytes) else str(item)

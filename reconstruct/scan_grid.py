@@ -1,0 +1,158 @@
+"""Rays in the order of time -> scans: a row for each pass, a column for each direction, clockwise."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.angles import circular_mean_deg, difference_deg
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import InputError
+from reconstruct.filters import Step
+from reconstruct.records import Records
+
+TimeArray = NDArray[np.datetime64]
+
+SHARED_GEOMETRY_DEG = 0.005  # rays that differ less from scan to scan share one fit: 0.1 m at 1 km
+
+
+@dataclass(frozen=True, eq=False)
+class ScanGrid:
+    """Scans of one gate. Missing: NaN, and NaT."""
+
+    time_utc: TimeArray  # (scan, ray)
+    azimuth_deg: FloatArray  # (scan, ray)
+    elevation_deg: FloatArray  # (scan, ray)
+    radial_speed_mps: FloatArray  # (scan, ray) positive away
+    cnr_db: FloatArray  # (scan, ray)
+
+    @property
+    def scans(self) -> int:
+        """Number of scans."""
+        return len(self.radial_speed_mps)
+
+    @property
+    def middle_utc(self) -> TimeArray:
+        """(scan,) middle between the first and the last ray that is there."""
+        known = ~np.isnat(self.time_utc)
+        ticks = self.time_utc.astype("datetime64[ns]").astype(np.int64)
+        ends = np.iinfo(np.int64)
+        first = np.min(ticks, axis=1, where=known, initial=ends.max)
+        last = np.max(ticks, axis=1, where=known, initial=ends.min)
+        return np.asarray((first + (last - first) // 2).astype("datetime64[ns]"))
+
+    @property
+    def geometry(self) -> tuple[FloatArray, FloatArray]:
+        """Azimuths and elevations that the fits are made with: (ray,) where all scans share them, else (scan, ray)."""
+        azimuth = np.asarray(circular_mean_of(self.azimuth_deg))
+        elevation = _mean(self.elevation_deg)
+        off = np.abs(np.asarray(difference_deg(self.azimuth_deg, azimuth)))
+        apart = np.fmax(off, np.abs(self.elevation_deg - elevation))
+        if np.max(apart, initial=0.0, where=np.isfinite(apart)) <= SHARED_GEOMETRY_DEG:
+            return azimuth, elevation
+        return self.azimuth_deg, self.elevation_deg
+
+
+class Gridded(NamedTuple):
+    """Scans, and what did not fit among them."""
+
+    grid: ScanGrid
+    step: Step
+    offset_deg: float  # of the measured azimuths from the planned ones
+
+
+def scan_grid(records: Records, planned_azimuth_deg: FloatArray, *, step_deg: float) -> Gridded:
+    """Sort the rays of one gate into scans.
+
+    Parameters
+    ----------
+    records : Records
+        With one gate; pointing angles.
+    planned_azimuth_deg : numpy.ndarray
+        (ray,) in clockwise order [deg].
+    step_deg : float
+        Angle between them [deg].
+
+    Returns
+    -------
+    Gridded
+        The whole fan is moved onto the measured azimuths first, by at most half a step. Rays that are then
+        further than half a step from every column, and second rays in a column of one pass, are counted as
+        lost.
+
+    Raises
+    ------
+    InputError
+        If there is not exactly one gate.
+
+    Examples
+    --------
+    >>> records = Records(time_utc=np.arange(4).astype("datetime64[s]"), duration_s=np.ones(4),
+    ...     azimuth_deg=np.array([359.0, 1.0, 1.0, 359.0]), elevation_deg=np.zeros(4), scan_id=np.zeros(4, int),
+    ...     sweep_id=np.array([0, 0, 1, 1]), range_m=np.array([1000.0]), radial_speed_mps=np.arange(4.0)[:, None],
+    ...     cnr_db=np.zeros((4, 1)))
+    >>> scan_grid(records, np.array([359.0, 1.0]), step_deg=2.0).grid.radial_speed_mps
+    array([[0., 1.],
+           [3., 2.]])
+    """
+    if records.gates != 1:
+        raise InputError(f"records with {records.gates} gates came: choose one with at_gates first")
+    column, offset = _columns(records.azimuth_deg, planned_azimuth_deg, step_deg)
+    _, row = np.unique(records.sweep_id, return_inverse=True)
+    rows, columns = int(row.max(initial=-1)) + 1, len(planned_azimuth_deg)
+    cell = row * columns + column
+    _, first = np.unique(cell[column >= 0], return_index=True)
+    kept = np.flatnonzero(column >= 0)[first]
+    place = cell[kept]
+
+    def gridded(values: FloatArray) -> FloatArray:
+        out = np.full(rows * columns, np.nan)
+        out[place] = values[kept]
+        return out.reshape(rows, columns)
+
+    time = np.full(rows * columns, np.datetime64("NaT", "ns"))
+    time[place] = records.time_utc[kept]
+    grid = ScanGrid(
+        time.reshape(rows, columns),
+        gridded(records.azimuth_deg),
+        gridded(records.elevation_deg),
+        gridded(records.radial_speed_mps[:, 0]),
+        gridded(records.cnr_db[:, 0]),
+    )
+    return Gridded(grid, Step("in the scan", records.rays, len(kept)), offset)
+
+
+def circular_mean_of(angle_deg: FloatArray) -> FloatArray:
+    """(column,) circular means of what is there [deg]."""
+    known = np.isfinite(angle_deg)
+    return circular_mean_deg(np.where(known, angle_deg, 0.0), weights=known.astype(float), axis=0)
+
+
+def _columns(azimuth_deg: FloatArray, planned_deg: FloatArray, step_deg: float) -> tuple[IntArray, float]:
+    """Column of each ray, -1 where none is near, and how far the fan was moved [deg]."""
+    if not len(azimuth_deg):
+        return np.empty(0, dtype=np.intp), 0.0
+    nearest, off = _nearest(azimuth_deg, planned_deg)
+    offset = float(np.median(off))
+    nearest, off = _nearest(azimuth_deg, planned_deg + offset)
+    return np.where(np.abs(off) <= 0.5 * step_deg, nearest, -1), offset
+
+
+def _nearest(azimuth_deg: FloatArray, planned_deg: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Index of the planned direction nearest to each ray, and the turn from it."""
+    turn = np.mod(planned_deg, 360.0)
+    order = np.argsort(turn)
+    ring = np.concatenate([[turn[order[-1]] - 360.0], turn[order], [turn[order[0]] + 360.0]])
+    index = np.concatenate([[order[-1]], order, [order[0]]])
+    right = np.clip(np.searchsorted(ring, azimuth_deg), 1, len(ring) - 1)
+    closer = np.where(azimuth_deg - ring[right - 1] <= ring[right] - azimuth_deg, right - 1, right)
+    found = index[closer]
+    return found.astype(np.intp), np.asarray(difference_deg(azimuth_deg, planned_deg[found]))
+
+
+def _mean(values: FloatArray) -> FloatArray:
+    known = np.isfinite(values)
+    count = np.count_nonzero(known, axis=0)
+    total = np.sum(values, axis=0, where=known)
+    return np.asarray(total / np.where(count > 0, count, np.nan))

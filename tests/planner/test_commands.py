@@ -1,0 +1,130 @@
+"""`point`, `check` and `wakes`: what they print, their JSON, their exit codes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from planner.cli import run
+
+ROOT = Path(__file__).resolve().parents[2]
+HOVSORE = str(ROOT / "examples" / "hovsore" / "site.yaml")
+KASSEL = str(ROOT / "examples" / "kassel" / "site.yaml")
+PROGRAM = "import sys; from planner.cli import main; main()"
+
+POINT_KEYS = {
+    *("lidar", "target", "azimuth_true_deg", "azimuth_grid_deg", "azimuth_head_deg", "elevation_deg"),
+    *("elevation_head_deg", "range_m", "gate_index", "gate_centre_m", "convergence_deg"),
+}
+CHECK_KEYS = {"severity", "code", "subject", "value", "unit", "limit", "text"}
+WAKES_KEYS = {"lidar", "scan", "target", "model", "excluded_deg", "free_deg", "lost_share"}
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> str:
+    assert run(list(arguments)) == code
+    return capsys.readouterr().out
+
+
+def document(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> Any:
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is no JSON")
+
+    return json.loads(printed(capsys, *arguments, "--json", code=code), parse_constant=refuse)
+
+
+def test_point_gives_every_lidar_at_every_target(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = document(capsys, "point", HOVSORE)
+    assert [(row["lidar"], row["target"]) for row in rows] == [(f"WS_{name}", "cup") for name in "KSW"]
+    assert all(set(row) >= POINT_KEYS for row in rows)
+    assert round(rows[2]["azimuth_true_deg"], 2) == 232.40
+    assert len(document(capsys, "point", KASSEL)) == 16
+
+
+def test_point_without_gates_names_none(capsys: pytest.CaptureFixture[str]) -> None:
+    assert {row["gate_index"] for row in document(capsys, "point", KASSEL)} == {None}
+
+
+def test_check_exits_1_where_a_finding_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    """Kassel has one, Høvsøre none; the document is complete all the same."""
+    kassel = document(capsys, "check", KASSEL, code=1)
+    hovsore = document(capsys, "check", HOVSORE, code=0)
+    assert [row["code"] for row in kassel if row["severity"] == "error"] == ["opening-angle"]
+    assert all(set(row) == CHECK_KEYS for row in kassel + hovsore)
+    assert {row["severity"] for row in hovsore} == {"warning", "info"}
+
+
+def test_wakes_gives_sectors_as_pairs(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = document(capsys, "wakes", HOVSORE)
+    assert all(set(row) >= WAKES_KEYS for row in rows)
+    sector = next(row for row in rows if row["scan"] == "sector")
+    assert sector["model"] == "union"
+    ((begin, end),) = sector["free_deg"]
+    assert 118 < begin < 130  # IEC takes more of the arc than the study's 118 to 270
+    assert 250 < end < 270
+    assert sector["excluded_deg"] == [[end, begin]]
+    assert 0 < sector["lost_share"] < 0.2
+
+
+def test_wakes_of_a_site_without_turbines_loses_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = document(capsys, "wakes", KASSEL)
+    assert {(row["lost_share"], str(row["free_deg"])) for row in rows} == {(0.0, "[[0.0, 360.0]]")}
+
+
+@pytest.mark.parametrize("command", ["point", "check", "wakes"])
+def test_tables_fit_on_a_page_and_remarks_go_to_stderr(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    assert run([command, HOVSORE]) == 0
+    told = capsys.readouterr()
+    assert "WS_S" in told.out or "sector" in told.out
+    assert max(map(len, told.out.splitlines())) <= 220
+    assert told.err.strip()
+    assert run([command, HOVSORE, "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_names_are_text_and_not_markup(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A lidar called [red]A[/red] keeps its brackets on the terminal."""
+    text = Path(KASSEL).read_text(encoding="utf-8").replace("name: WS4,", "name: '[red]A[/red]',")
+    site = tmp_path / "site.yaml"
+    site.write_text(text.replace("lidar: WS4", "lidar: '[red]A[/red]'"), encoding="utf-8")
+    assert "[red]A[/red]" in printed(capsys, "point", str(site))
+
+
+@pytest.mark.parametrize("command", ["point", "check", "wakes"])
+def test_a_site_file_with_faults_exits_2_with_all_of_them(command: str, tmp_path: Path) -> None:
+    """As a whole process: one message, line and key, no traceback, nothing on standard output."""
+    site = tmp_path / "site.yaml"
+    text = Path(KASSEL).read_text(encoding="utf-8")
+    site.write_text(text.replace("lidar: WS4", "lidar: WS9").replace("northing", "n"), encoding="utf-8")
+    command_line = [sys.executable, "-c", PROGRAM, command, str(site), "--json"]
+    done = subprocess.run(
+        command_line, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("WS9") == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_a_site_comes_from_standard_input_too() -> None:
+    text = Path(HOVSORE).read_text(encoding="utf-8")
+    command_line = [sys.executable, "-c", PROGRAM, "point", "-", "--json", "--quiet"]
+    done = subprocess.run(
+        command_line, cwd=ROOT, input=text, capture_output=True, text=True, encoding="utf-8", check=True
+    )
+    assert len(json.loads(done.stdout)) == 3
+    assert done.stderr == ""
+
+
+def test_a_site_without_scans_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    site = tmp_path / "site.yaml"
+    lidar = "{name: A, position: [500000, 6250000, 10], instrument: windscanner-200s}"
+    site.write_text(f"name: Moor\ncrs: EPSG:32632\nlidars: [{lidar}]\n", encoding="utf-8")
+    assert "no measured volume" in printed(capsys, "wakes", str(site))
+    assert "Nothing found" in printed(capsys, "check", str(site))
+    assert document(capsys, "check", str(site)) == []
+    assert run(["point", str(site)]) == 2
+    assert "0 targets" in capsys.readouterr().err
