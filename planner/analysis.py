@@ -7,9 +7,8 @@ is held in memory but the sums of its periods.
 
 import hashlib
 import json
-import pickle
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,10 +19,11 @@ from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from planner.campaign import Campaign, PairInput, RayInput
 from planner.files.yaml_campaign import Loaded
-from planner.output import output_folder, write_bytes
+from planner.kept_parts import Kept, read_kept, read_series, write_kept
+from planner.output import output_folder
 from planner.plan import Plan
 from planner.ray_files import Part, at_gate, parts_of
-from planner.scan_retrieval import ScanJob, ScanPart, job_of, periods_of, retrieve_part, wind_table
+from planner.scan_retrieval import ScanJob, empty_part, job_of, periods_of, retrieve_part, wind_table
 from reconstruct.automatic_filter import Agreement
 from reconstruct.averaging import PeriodSums, TimeArray, add_sums, means_of, period_sums
 from reconstruct.filters import Step
@@ -50,14 +50,6 @@ class Retrieved(NamedTuple):
     means: dict[float, "pd.DataFrame"]  # by period [s]
     gaps: dict[str, tuple[GapResult, ...]]  # by pair, without winds
     resumed: int  # parts that an earlier run had done
-
-
-class _Kept(NamedTuple):
-    """What is kept of one part."""
-
-    part: ScanPart
-    pending: Records | None  # the last pass, which the next part may go on with
-    notes: tuple[str, ...]
 
 
 def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None = None) -> Retrieved:
@@ -92,10 +84,11 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
         for number, item in enumerate(campaign.inputs):
             job = job_of(plan.layout[item.scan], plan.places, campaign.sizes_deg)
             merged = _Merged()
-            for kept, was_there, share in _worked(item, job, campaign, plan, work):
+            own = campaign if item.filters is None else campaign.model_copy(update={"filters": item.filters})
+            for kept, was_there, share in _worked(item, job, own, plan, work):
                 merged.add(kept)
                 resumed += was_there
-                _append_fast(folder, item.scan, kept.part)
+                _append_fast(folder, item.scan, kept.part.fast)
                 for (sector_deg, period_s), part in kept.part.sums.items():
                     sums.setdefault((item.scan, sector_deg, period_s), []).append(part)
                 _tell(progress, (number + share) / (len(campaign.inputs) + bool(campaign.pairs)))
@@ -134,49 +127,53 @@ class _Merged:
     """Counts and notes of the parts of one scan, added up."""
 
     def __init__(self) -> None:
-        self.steps: tuple[Step, ...] = ()
+        self._steps: dict[str, Step] = {}
         self.agreement = Agreement(0, 0, 0, 0)
         self.notes: tuple[str, ...] = ()
 
-    def add(self, kept: _Kept) -> None:
-        part = kept.part
-        if self.steps:
-            self.steps = tuple(one + other for one, other in zip(self.steps, part.steps, strict=True))
-        else:
-            self.steps = part.steps
-        both = zip(self.agreement, part.agreement, strict=True)
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """One of each name, in their order."""
+        return tuple(self._steps.values())
+
+    def add(self, kept: Kept) -> None:
+        """Count another part."""
+        for step in kept.part.steps:
+            self._steps[step.name] = self._steps[step.name] + step if step.name in self._steps else step
+        both = zip(self.agreement, kept.part.agreement, strict=True)
         self.agreement = Agreement(*(one + other for one, other in both))
         self.notes = tuple(dict.fromkeys((*self.notes, *kept.notes)))
 
 
 def _worked(
     item: RayInput, job: ScanJob, campaign: Campaign, plan: Plan, work: Path
-) -> Iterator[tuple[_Kept, bool, float]]:
+) -> Iterator[tuple[Kept, bool, float]]:
     """The parts of one input, each worked on or taken from an earlier run, with the share that is done."""
-    parts = list(parts_of(item))
     pending: Records | None = None
-    for number, part in enumerate(parts):
-        place = work / f"{file_name(item.scan)}-{number:05d}.part"
-        mark = f"{part.fingerprint} {_ends_of(pending)} {number == len(parts) - 1}"
-        kept = _kept_at(place, mark)
+    parts = parts_of(item, job.layout, plan.places, rays=campaign.chunk_rays)
+    for number, (part, last) in enumerate(_with_last(parts)):
+        place = work / f"{file_name(item.scan)}-{number:06d}.npz"
+        mark = f"{part.fingerprint} {_ends_of(pending)} {last}"
+        kept = read_kept(place, mark)
         was_there = kept is not None
         if kept is None:
-            kept = _work(part, pending, item, job, campaign, plan, last=number == len(parts) - 1)
-            write_bytes(place, pickle.dumps((mark, kept)))
+            kept = _work(part, pending, item, job, campaign, plan, last=last)
+            write_kept(place, mark, kept)
         pending = kept.pending
-        yield kept, was_there, (number + 1) / len(parts)
+        yield kept, was_there, part.share
+
+
+def _with_last(parts: Iterator[Part]) -> Iterator[tuple[Part, bool]]:
+    """Each part, and whether it is the last."""
+    part = next(parts, None)
+    while part is not None:
+        following = next(parts, None)
+        yield part, following is None
+        part = following
 
 
 def _ends_of(pending: Records | None) -> str:
     return "" if pending is None else f"{pending.time_utc[0]} {pending.rays}"
-
-
-def _kept_at(place: Path, mark: str) -> _Kept | None:
-    """What an earlier run of this program kept; None where it is not there or of other data."""
-    if not place.is_file():
-        return None
-    found, kept = pickle.loads(place.read_bytes())
-    return kept if found == mark else None
 
 
 def _work(
@@ -188,27 +185,40 @@ def _work(
     plan: Plan,
     *,
     last: bool,
-) -> _Kept:
-    records = at_gate(part.load(), item, job.layout, plan.places)
-    notes = (*records.notes, *(str(loss) for loss in records.losses))
+) -> Kept:
+    records, notes = _loaded(part, item, job, plan)
     if pending is not None:
-        records = join([pending, records])
+        records = pending if records is None else join([pending, records])
+    if records is None or not records.rays:
+        return Kept(empty_part(), None, notes)
     later: Records | None = None
-    if not last and job.layout.scan.count > 1 and records.rays:
+    if not last and job.layout.scan.count > 1:
         final = records.sweep_id == records.sweep_id[-1]
         records, later = records.at_rays(~final), records.at_rays(final)
         later = replace(later, notes=(), losses=())
-    return _Kept(retrieve_part(records, job, campaign), later, notes)
+    worked = retrieve_part(records, job, campaign) if records.rays else empty_part()
+    return Kept(worked, later, notes)
 
 
-def _append_fast(folder: Path, scan: str, part: ScanPart) -> None:
+def _loaded(part: Part, item: RayInput, job: ScanJob, plan: Plan) -> tuple[Records | None, tuple[str, ...]]:
+    """The rays of a part at the gate, and what there is to say of them; a bad file among others is a note."""
+    try:
+        records = at_gate(part.load(), item, job.layout, plan.places)
+    except InputError as error:
+        if part.alone:
+            raise
+        return None, (f"lost: {error}",)
+    return records, (*records.notes, *(f"lost: {loss}" for loss in records.losses))
+
+
+def _append_fast(folder: Path, scan: str, fast: Mapping[str, FloatArray | TimeArray]) -> None:
     """Add the winds of a part to the scan's table."""
     import pandas as pd
 
-    if not part.fast:
+    if not fast:
         return
     path = folder / f"fast_{file_name(scan)}.csv"
-    frame = pd.DataFrame(part.fast).sort_values(["time_utc", "sector_deg"], ascending=[True, False], kind="stable")
+    frame = pd.DataFrame(fast).sort_values(["time_utc", "sector_deg"], ascending=[True, False], kind="stable")
     frame.to_csv(path, mode="a", header=not path.exists(), index=False, float_format="%.5f", encoding="utf-8")
 
 
@@ -285,7 +295,7 @@ def _retrieve_pair(
         wind = dual_wind(first, second, gap_s=gap_s)
         left = np.isfinite(wind.fit.wind_mps[:, 0])
         table = wind_table(wind.time_utc, wind.fit, float("nan"), left) | {"gap_s": wind.gap_s[left]}
-        _append_fast(folder, pair.pair, ScanPart(table, {}, first, (), Agreement(0, 0, 0, 0), 0.0))
+        _append_fast(folder, pair.pair, table)
         for period_s in periods_of(campaign):
             part = period_sums(
                 wind.time_utc,
@@ -309,9 +319,8 @@ def _added(results: tuple[GapResult, ...]) -> GapResult:
 
 
 def _kept_series(work: Path, scan: str) -> Iterator[RaySeries]:
-    for place in sorted(work.glob(f"{file_name(scan)}-*.part")):
-        _, kept = pickle.loads(place.read_bytes())
-        yield kept.part.series
+    for place in sorted(work.glob(f"{file_name(scan)}-*.npz")):
+        yield read_series(place)
 
 
 def stretches(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from geometry.arrays import FloatArray
-from planner.fidelity import Air
+from planner.fidelity_wind import Air
 from planner.places import Places
 from planner.site import Mast
 from reconstruct.persistence import split_covariance

@@ -12,13 +12,12 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 from planner.nouns import Count, Name, NonNegative, Noun, Number, Positive, Share
 
 Kind = Literal[
-    "auto", "csv", "parquet", "store", "windscanner", "windcube", "cfradial", "hpl", "nacelle", "database"
-]
+    "auto", "csv", "parquet", "store", "windscanner", "cfradial", "hpl", "nacelle", "database"
+]  # auto: what the file's first bytes say
 Limit = Annotated[float, Field(strict=True)] | None
 Bearing = Annotated[float, Field(strict=True, ge=0, le=360)]
 Size = Annotated[float, Field(strict=True, gt=0, le=360)]
 STUDY_AVAILABILITY = 0.38  # 19 of 50 scans in ten minutes
-STUDY_GAPS_S = (0.5, 2.0, 5.0, 8.0)
 CNR_DB = (-25.0, -5.0)  # a usual range of the device
 
 
@@ -53,35 +52,13 @@ class Offsets(Noun):
     clock_s: Number = 0.0
 
 
-class RayInput(Noun):
-    """The measured rays of one scan of the site."""
-
-    scan: Name
-    kind: Kind = "auto"
-    path: Annotated[str, Field(min_length=1)] | None = None  # a file, a folder, or a pattern such as rays/WS_S*.csv
-    url: Annotated[str, Field(min_length=1)] | None = None  # of a database
-    scenario: Annotated[int, Field(strict=True)] | None = None  # of the study's database: this one only
-    angles: Literal["head", "true"] = "head"  # as the instrument shows them, or pointing angles already
-    gate_m: Positive | None = None  # default: the gate at the scan's target
-    offsets: Offsets = Offsets()
-    stamp: Literal["auto", "start", "middle", "end"] = "auto"
-    azimuth: Literal["auto", "scanner", "estimate", "stored"] = "auto"  # WindScanner text files
-    columns: Columns | None = None
-
-    @model_validator(mode="after")
-    def _one_place(self) -> Self:
-        if (self.path is None) == (self.url is None):
-            raise ValueError("give either `path` (files) or `url` (a database)")
-        return self
-
-
 class Filters(Noun):
     """What is taken away from the rays and scans. A limit that is missing is left to the automatic filter."""
 
     cnr_db: Limits | None = None
     radial_speed_mps: Limits | None = None
     automatic: Literal["auto", "on", "off"] = "auto"  # auto: where a limit is missing
-    window_scans: Annotated[int, Field(strict=True, ge=3)] = 50
+    window_s: Positive = 600.0  # of the automatic filter
     distance: Positive = 5.0  # robust standard deviations
     ray_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0  # of a scan's rays; 1 drops every partial scan
     residual_std_mps: Positive | None = None  # largest
@@ -90,7 +67,31 @@ class Filters(Noun):
     noise_mps: Positive = 0.1  # of one radial speed, for the reduced chi square
 
 
-Pairs = tuple[tuple[Bearing, Bearing], ...]
+class RayInput(Noun):
+    """The measured rays of one scan of the site."""
+
+    scan: Name
+    kind: Kind = "auto"
+    path: Annotated[str, Field(min_length=1)] | None = None  # a file, a folder, or a pattern such as rays/WS_S*.csv
+    url: Annotated[str, Field(min_length=1)] | None = None  # of a database
+    scenarios: tuple[Annotated[int, Field(strict=True)], ...] | None = None  # of a database: these only
+    instrument: Name | None = None  # of a store that holds several
+    angles: Literal["head", "true"] = "head"  # as the instrument shows them, or pointing angles already
+    gate_m: Positive | None = None  # default: the gate at the scan's target
+    offsets: Offsets = Offsets()
+    stamp: Literal["auto", "start", "middle", "end"] = "auto"
+    azimuth: Literal["auto", "scanner", "estimate", "stored"] = "auto"  # WindScanner text files
+    columns: Columns | None = None
+    filters: Filters | None = None  # of this scan, in place of the campaign's
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.path is None) == (self.url is None):
+            raise ValueError("either `path` (files) or `url` (a database)")
+        return self
+
+
+Sectors = tuple[tuple[Bearing, Bearing], ...]
 
 
 def _which_tag(value: object) -> str:
@@ -98,7 +99,7 @@ def _which_tag(value: object) -> str:
 
 
 Directions = Annotated[
-    Annotated[Literal["site", "all"], Tag("<word>")] | Annotated[Pairs, Field(min_length=1), Tag("<pairs>")],
+    Annotated[Literal["site", "all"], Tag("<word>")] | Annotated[Sectors, Field(min_length=1), Tag("<pairs>")],
     Discriminator(_which_tag),
 ]
 

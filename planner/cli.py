@@ -24,8 +24,10 @@ COMMANDS = (
     "view",
     "report",
     "tradeoff",
+    "place",
     "simulate",
     "retrieve",
+    "compare",
     "tour",
 )  # modules of planner.commands, in the order of the help
 

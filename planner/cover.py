@@ -219,7 +219,7 @@ def _arranged(points: FloatArray, covered: BoolArray, at_least: int) -> Cover:
 
 
 def _circled(points: FloatArray, disc: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Discs numbered without gaps; centres (disc, 2) and radii of the smallest circles around their points."""
+    """Discs without gaps in their numbers, and the smallest circles: centres (disc, 2) and radii."""
     used, numbered = np.unique(disc, return_inverse=True)
     circles = [_smallest_circle(points[numbered == number]) for number in range(len(used))]
     return numbered, np.array([centre for centre, _ in circles]), np.array([reach for _, reach in circles])

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.error_model import REFERENCE, Model
 from planner.error_nouns import MEAN_FIELDS, SCAN_FIELDS, Size, SizeError
-from planner.fidelity import POINT_PROBE
+from planner.fidelity_wind import POINT_PROBE
 from reconstruct.campaign import predict_campaign
 from reconstruct.climate import Climate
 from reconstruct.prediction import (

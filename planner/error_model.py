@@ -9,7 +9,7 @@ from geometry.angles import SectorSet
 from geometry.errors import InputError
 from geometry.scan import Scan
 from planner.exclusion import Exclusion
-from planner.fidelity import Air
+from planner.fidelity_wind import Air
 from planner.places import Places
 from planner.ray_sets import pair_rays, sector_rays
 from planner.scan_layout import ScanLayout
@@ -90,28 +90,25 @@ def required_turbulence(site: Site, tier: Tier) -> Turbulence | None:
     return eddies
 
 
-def air_of_scan(places: Places, layout: ScanLayout, exclusion: Exclusion) -> Air:
-    """What the size of an effect on a declared sector scan is judged with."""
-    rays = sector_rays(places, layout, layout.scan, exclusion.target)
-    return _air(places.site, exclusion.target, exclusion.excluded, rays, [layout])
-
-
-def air_of_narrowest(places: Places, layout: ScanLayout, narrowest: Scan, exclusion: Exclusion) -> Air:
-    """The same for the narrowest scan that its error is predicted for."""
-    rays = sector_rays(places, layout, narrowest, exclusion.target)
-    return _air(places.site, exclusion.target, exclusion.excluded, rays, [layout])
+def air_of_scan(places: Places, layout: ScanLayout, scan: Scan, exclusion: Exclusion) -> Air:
+    """What the size of an effect on a sector scan is judged with; `scan` is the declared one or another size of it."""
+    rays = sector_rays(places, layout, scan, exclusion.target)
+    name = f"{layout.name}, {scan.count} rays"
+    return _air(name, places.site, exclusion.target, exclusion.excluded, rays, [layout])
 
 
 def air_of_pair(places: Places, pair: Pair, layouts: tuple[ScanLayout, ...], excluded: SectorSet) -> Air:
     """What the size of an effect on a pair is judged with."""
     rays = pair_rays(places, layouts, pair.target)
-    return _air(places.site, pair.target, excluded, rays, layouts)
+    return _air(pair.name, places.site, pair.target, excluded, rays, layouts)
 
 
-def _air(site: Site, target: str, excluded: SectorSet, rays: Rays, layouts: Sequence[ScanLayout]) -> Air:
+def _air(
+    name: str, site: Site, target: str, excluded: SectorSet, rays: Rays, layouts: Sequence[ScanLayout]
+) -> Air:
     """The climate's mean speed from each of its directions."""
     climate = climate_at(site, target, excluded)
     like = replace(state_like(site, target), speed_mps=climate.mean(climate.speed_mps))
     states = [replace(like, from_deg=float(angle)) for angle in np.unique(climate.from_deg)]
     sources = [error_sources(layout.lidar, ray_noise(site, layout, target).noise_mps) for layout in layouts]
-    return Air(rays, states, sources, turbulence(site))
+    return Air(name, rays, states, sources, turbulence(site))

@@ -9,29 +9,26 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from geometry.angles import SectorSet, difference_deg, wrap_180_deg
-from geometry.disturbed import any_of
-from planner.budget import Budget, mast_of, ten_minute_budget
 from planner.crossings import PairCrossing, crossings
-from planner.error_curve import SizesFrom, default_sizes, default_tier, pair_curve, sector_curve
-from planner.error_model import air_of_narrowest, air_of_pair, air_of_scan
-from planner.error_nouns import ErrorCurve
 from planner.exclusion import Exclusion, Near, exclusions, near_wakes, wanted_directions
-from planner.fidelity import Air, Effect, earth_model, geometric_effects, left_out, wind_effects
+from planner.fidelity import Effect, earth_model, geometric_effects
 from planner.obstruction import Obstruction, obstructions
 from planner.places import Places
 from planner.pointing import Pointing, pointings
-from planner.ray_sets import own_scan
 from planner.scan_layout import ScanLayout, lay_out
-from planner.sector_size import Recommendation, recommend
-from planner.site import Pair, Site
-from planner.wind_climate import largest_gust_mps
+from planner.site import Site
 from planner.wind_rose import prevailing_deg
-from reconstruct.prediction import Tier
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # what predicts errors is imported where it is used: pointing has no need to wait for it
     from numpy.random import Generator
 
+    from planner.budget import Budget
+    from planner.error_curve import SizesFrom
+    from planner.error_nouns import ErrorCurve
+    from planner.predicted import Predicted
+    from planner.sector_size import Recommendation
     from planner.tradeoff import Progress, Trade
+    from reconstruct.prediction import Tier
 
 
 @dataclass(frozen=True)
@@ -56,47 +53,9 @@ class Plan:
         return Places(self.site, earth_model(self.exact_places, self.geometric_effects))
 
     @cached_property
-    def fidelity(self) -> tuple[Effect, ...]:
-        """Every effect that could be left out, with its size here, and whether it is."""
-        return (*self.geometric_effects, *wind_effects(self.site, self._airs))
-
-    @cached_property
-    def _declared_airs(self) -> tuple[tuple[str, str, Air], ...]:
-        """Every sector scan and pair as declared, with its target, in the middle of the wind's speeds."""
-        scans = [
-            (item.scan, item.target, air_of_scan(self.places, self.layout[item.scan], item))
-            for item in self._sectors
-        ]
-        pairs = [
-            (pair.name, pair.target, air_of_pair(self.places, pair, *self._pair(pair)))
-            for pair in self.site.pairs
-        ]
-        return (*scans, *pairs)
-
-    @cached_property
-    def _airs(self) -> tuple[Air, ...]:
-        """The same, and every sector scan at its narrowest size, which feels most effects most."""
-        narrow = [
-            air_of_narrowest(self.places, layout, own_scan(layout, default_sizes(layout)[-1]), item)
-            for item in self._sectors
-            for layout in [self.layout[item.scan]]
-        ]
-        return (*(air for _, _, air in self._declared_airs), *narrow)
-
-    @cached_property
-    def _sectors(self) -> tuple[Exclusion, ...]:
-        """The exclusions of sector scans."""
-        return tuple(item for item in self.exclusions if self.layout[item.scan].spec.type == "sector")
-
-    def _pair(self, pair: Pair) -> tuple[tuple[ScanLayout, ...], SectorSet]:
-        """The scans of a pair, and the directions in which a wake touches what any of them measures."""
-        met = [item for item in self.exclusions if item.scan in pair.scans and item.target == pair.target]
-        return tuple(self.layout[name] for name in pair.scans), any_of(item.excluded for item in met)
-
-    @cached_property
     def layouts(self) -> tuple[ScanLayout, ...]:
         """Every scan laid out in space, in the order of the site file."""
-        return tuple(lay_out(self.places, spec) for spec in self.site.scans)
+        return tuple(lay_out(self.exact_places, spec) for spec in self.site.scans)
 
     @cached_property
     def layout(self) -> Mapping[str, ScanLayout]:
@@ -106,7 +65,7 @@ class Plan:
     @cached_property
     def pointings(self) -> tuple[Pointing, ...]:
         """Every lidar at every target."""
-        return pointings(self.places, self.layouts)
+        return pointings(self.exact_places, self.layouts)
 
     @cached_property
     def crossings(self) -> tuple[PairCrossing, ...]:
@@ -123,14 +82,31 @@ class Plan:
         """Everything solid that a ray touches or nearly touches."""
         return obstructions(self.places, self.layouts)
 
+    @cached_property
+    def predicted(self) -> "Predicted":
+        """Errors, budgets and effects: loaded when first asked for."""
+        from planner.predicted import Predicted
+
+        return Predicted(self.places, self.layout, self.exclusions, self.geometric_effects)
+
+    @property
+    def fidelity(self) -> tuple[Effect, ...]:
+        """Every effect that could be left out, with its size here, and whether it is."""
+        return self.predicted.fidelity
+
+    @property
+    def budgets(self) -> "tuple[Budget, ...]":
+        """Uncertainty budget of the ten-minute means of every declared sector scan and every pair."""
+        return self.predicted.budgets
+
     def errors(
         self,
         *,
-        tier: Tier | None = None,
+        tier: "Tier | None" = None,
         sizes_deg: Sequence[float] | None = None,
-        sizes_from: SizesFrom = "own",
+        sizes_from: "SizesFrom" = "own",
         progress: "Progress | None" = None,
-    ) -> tuple[ErrorCurve, ...]:
+    ) -> "tuple[ErrorCurve, ...]":
         """Predicted error of every sector scan at each of its targets, for each size, then of every pair.
 
         Parameters
@@ -140,52 +116,33 @@ class Plan:
         sizes_deg
             Sector sizes [deg]; default: each scan's declared one and the usual smaller ones.
         sizes_from
-            "own" or "subset", see `error_curve.sector_curve`.
+            "own": each size is a scan of its own; "subset": the middle rays of the declared scan, at its timing.
         progress
             Gets the share of the work that is done for each curve, in the Monte Carlo tier.
+
+        Raises
+        ------
+        InputError
+            If a size does not fit a scan, or the site does not say what the tier needs.
         """
-        simpler = left_out(self.fidelity)
-        chosen = tier or default_tier(self.site, simpler)
-        sectors = [
-            sector_curve(
-                self.places,
-                self.layout[item.scan],
-                item,
-                tier=chosen,
-                sizes_deg=sizes_deg,
-                sizes_from=sizes_from,
-                left_out=simpler,
-                progress=progress,
-            )
-            for item in self._sectors
-        ]
-        pairs = [
-            pair_curve(self.places, pair, *self._pair(pair), tier=chosen, left_out=simpler, progress=progress)
-            for pair in self.site.pairs
-        ]
-        return (*sectors, *pairs)
+        return self.predicted.errors(tier=tier, sizes_deg=sizes_deg, sizes_from=sizes_from, progress=progress)
 
     @cached_property
-    def default_errors(self) -> tuple[ErrorCurve, ...]:
+    def default_errors(self) -> "tuple[ErrorCurve, ...]":
         """The errors by the default tier and sizes, once."""
         return self.errors()
-
-    @cached_property
-    def budgets(self) -> tuple[Budget, ...]:
-        """Uncertainty budget of the ten-minute means of every declared sector scan and every pair."""
-        return tuple(
-            ten_minute_budget(name, target, air, mast_of(self.places, target))
-            for name, target, air in self._declared_airs
-        )
 
     def trades(self, *, rng: "Generator", progress: "Progress | None" = None) -> "tuple[Trade, ...]":
         """Time and error of every cheaper way on this machine: each call measures anew."""
         from planner.tradeoff import trades
 
-        return trades(self.exact_places, self._airs[0] if self._airs else None, rng=rng, progress=progress)
+        airs = self.predicted.airs
+        return trades(self.exact_places, airs[0] if airs else None, rng=rng, progress=progress)
 
-    def recommendation(self, curve: ErrorCurve) -> Recommendation:
+    def recommendation(self, curve: "ErrorCurve") -> "Recommendation":
         """The recommended sector size of a curve, with its reason."""
+        from planner.sector_size import recommend
+
         return recommend(curve, self.site.tolerance)
 
     @cached_property
@@ -200,6 +157,8 @@ class Plan:
 
     def largest_gust_mps(self, layout: ScanLayout) -> float:
         """The fastest wanted wind with its gusts, at a scan's fastest target [m/s]."""
+        from planner.wind_climate import largest_gust_mps
+
         return largest_gust_mps(self.site, layout.targets)
 
     @cached_property

@@ -21,19 +21,22 @@ from geometry.errors import UnavailableError
 from planner import palette
 from planner.assumptions import assumptions
 from planner.checks import findings
+from planner.error_entry import Entry, error_entries
 from planner.exclusion import Exclusion
 from planner.figures.canvas import DPI
 from planner.figures.map_layers import most_lost
 from planner.figures.sector_error import sector_error
 from planner.figures.site_map import site_map
+from planner.figures.tradeoff import tradeoff_figure
 from planner.figures.wake_rose import wake_rose
 from planner.finding import Finding
 from planner.output import output_folder
 from planner.plan import Plan
 from planner.plan_scene import plan_scene
-from planner.report_errors import Entry, error_entries, tier_curve
+from planner.report_errors import tier_curve
 from planner.report_numbers import KeyNumber, finding_counts, key_numbers
 from planner.report_tables import (
+    budget_table,
     crossing_table,
     directions,
     errors_table,
@@ -48,6 +51,7 @@ from planner.report_tables import (
 )
 from planner.report_values import DASH, Column, Table, csv_text, percent, quantity
 from planner.scene import Scene, opengl
+from planner.tradeoff import Trade
 
 PAGE = "report.html"
 SITE_COLUMN = Column("site", "site")
@@ -63,6 +67,7 @@ class SiteReport:
 
     plan: Plan
     number: int  # on the page, from 1
+    trades: Sequence[Trade] = ()  # measured beforehand, or none
 
     @cached_property
     def findings(self) -> list[Finding]:
@@ -102,7 +107,13 @@ class SiteReport:
 CSV_TABLES = ("pointing", "findings", "wakes", "crossings", "errors")
 
 
-def write_report(plans: Sequence[Plan], folder: Path, *, progress: Progress = lambda _: None) -> list[Path]:
+def write_report(
+    plans: Sequence[Plan],
+    folder: Path,
+    *,
+    trades: Sequence[Sequence[Trade]] = (),
+    progress: Progress = lambda _: None,
+) -> list[Path]:
     """Write the report of one or two plans: `report.html` and its tables as CSV.
 
     Parameters
@@ -111,6 +122,8 @@ def write_report(plans: Sequence[Plan], folder: Path, *, progress: Progress = la
         One, or two to be compared.
     folder
         Where the files go; they appear there all together, or none of them.
+    trades
+        For each plan what `Plan.trades` measured; without it the page says how to measure it.
     progress
         Is told what is being done.
 
@@ -124,7 +137,11 @@ def write_report(plans: Sequence[Plan], folder: Path, *, progress: Progress = la
     InputError
         If the folder cannot be written to, or a plan's numbers make no report.
     """
-    reports = [SiteReport(plan, number) for number, plan in enumerate(plans, start=1)]
+    measured = list(trades) or [()] * len(plans)
+    reports = [
+        SiteReport(plan, number, rows)
+        for number, (plan, rows) in enumerate(zip(plans, measured, strict=True), start=1)
+    ]
     with output_folder(folder) as staging, _asking_for_opengl():
         texts = {f"{name}.csv": _csv(reports, name) for name in CSV_TABLES}
         texts = {PAGE: _page(reports, progress), **texts}
@@ -208,6 +225,8 @@ def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
         "rose": wake_rose(plan),
         "free": [_free_sentence(item) for item in most_lost(plan)],
         "errors": _error_parts(report.errors),
+        "budgets": [budget_table(item) for item in plan.budgets],
+        "tradeoff": tradeoff_figure(report.trades) if report.trades else None,
         "assumptions": assumptions(plan.site),
         "findings": report.findings,
         "convergence_deg": plan.convergence_deg,

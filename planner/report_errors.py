@@ -1,37 +1,10 @@
-"""What a plan predicts about errors: as plain dicts for tables, as arrays for the figure."""
-
-from collections.abc import Mapping
-from typing import Any
+"""Predicted errors for the report: as arrays for the figure, and the row that counts."""
 
 import numpy as np
 
 from geometry.arrays import FloatArray
-from planner.error_nouns import ErrorCurve
+from planner.error_entry import Entry
 from planner.figures.sector_error import TierCurve
-from planner.plan import Plan
-
-Entry = Mapping[str, Any]  # one item of `lidarplan errors --json`
-
-
-def error_entries(plan: Plan) -> list[Entry]:
-    """Every predicted curve of a plan, by the default tier and sizes, with its recommendation."""
-    return [error_entry(plan, curve) for curve in plan.default_errors]
-
-
-def error_entry(plan: Plan, curve: ErrorCurve) -> Entry:
-    """One curve as `lidarplan errors --json` prints it."""
-    advice = plan.recommendation(curve)
-    return {
-        "lidar" if curve.lidar else "pair": curve.lidar or curve.scan,
-        "scan": curve.scan,
-        "target": curve.target,
-        "tier": curve.tier,
-        "reference": curve.reference,
-        "recommended_sector_deg": advice.sector_deg,
-        "reason": advice.reason,
-        "states": curve.states,
-        "sizes": [size.as_dict() for size in curve.sizes],
-    }
 
 
 def tier_curve(entry: Entry) -> TierCurve:

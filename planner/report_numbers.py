@@ -4,9 +4,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from planner.error_entry import Entry
 from planner.finding import SEVERITIES, Finding
 from planner.plan import Plan
-from planner.report_errors import Entry, recommended_size
+from planner.report_errors import recommended_size
 from planner.report_tables import TEN_MINUTES_S, directions, rays_lost
 from planner.report_values import DASH, fixed, percent
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from geometry.angles import SectorSet
 from geometry.gates import unambiguous_range_m
+from planner.budget import Budget
 from planner.exclusion import DEFICIT_STEP_DEG, Exclusion
 from planner.fidelity import Effect
 from planner.finding import Finding
@@ -94,6 +95,17 @@ SCANS = (
     Column("first_gate_m", "first gate", "m", 0),
     Column("last_gate_m", "last gate", "m", 0),
     Column("unambiguous_range_m", "unambiguous range", "m", 0),
+)
+
+BUDGET = (
+    Column("source", "source"),
+    Column("speed_std_mps", "speed, k = 1", "m/s", 4),
+    Column("speed_expanded_mps", "speed, k = 2", "m/s", 4),
+    Column("speed_share", "share of speed"),
+    Column("direction_std_deg", "direction, k = 1", "°", 3),
+    Column("direction_expanded_deg", "direction, k = 2", "°", 3),
+    Column("direction_share", "share of direction"),
+    Column("reason", "not known, because"),
 )
 
 FIDELITY = (
@@ -272,6 +284,27 @@ def size_table(entry: Mapping[str, Any]) -> Table:
     """One sector scan's predicted errors on the page, a row a size."""
     caption = f"{entry['scan']} → {entry['target']}: predicted error, tier {entry['tier']}"
     return _known_columns(caption, (), [((), size) for size in entry["sizes"]])
+
+
+def budget_table(budget: Budget) -> Table:
+    """What each source adds to the error of ten-minute means of one scan or pair; the total last."""
+    rows = tuple(
+        (
+            entry.source,
+            entry.speed_std_mps,
+            entry.expanded()[0],
+            None if entry.speed_share is None else percent(entry.speed_share),
+            entry.direction_std_deg,
+            entry.expanded()[1],
+            None if entry.direction_share is None else percent(entry.direction_share),
+            entry.reason or "",
+        )
+        for entry in budget.entries
+    )
+    wind = f"wind {budget.wind.speed_mps:.1f} m/s from {budget.wind.from_deg:.0f}°"
+    return Table(
+        "budget", f"{budget.scan} → {budget.target}: uncertainty of ten-minute means, {wind}", BUDGET, rows
+    )
 
 
 def pair_table(entries: Sequence[Mapping[str, Any]]) -> Table:

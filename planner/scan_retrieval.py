@@ -33,6 +33,8 @@ from reconstruct.scan_grid import ScanGrid, scan_grid
 from reconstruct.sector_scan import sector_wind
 from reconstruct.wind import from_deg, speed_mps
 
+LEAST_WINDOW_SCANS = 10  # a median and its deviation of fewer are hardly robust
+
 
 class Size(NamedTuple):
     """A sector size and the columns of the whole scan that stand for it; a stare has one without a size."""
@@ -115,7 +117,7 @@ def retrieve_part(records: Records, job: ScanJob, campaign: Campaign) -> ScanPar
         records = replace(records, sweep_id=np.arange(records.rays))
     gridded = scan_grid(records, job.planned_azimuth_deg, step_deg=job.step_deg)
     grid = gridded.grid
-    filtered, steps, agreement = filter_rays(grid, campaign.filters)
+    filtered, steps, agreement = filter_rays(grid, campaign.filters, period_s=job.layout.scan.period_s)
     series = _series(grid, filtered, job)
     steps = (gridded.step, *steps)
     fast: list[dict[str, FloatArray | TimeArray]] = []
@@ -125,7 +127,7 @@ def retrieve_part(records: Records, job: ScanJob, campaign: Campaign) -> ScanPar
         steps = (*steps, whole.step)
         for size in job.sizes:
             table, step = _fit(grid, whole.values, size, job, campaign)
-            steps = (*steps, step)
+            steps = (*steps, step) if judges_fit(campaign.filters) else steps
             fast.append(table)
             sums |= {
                 (size.sector_deg, period_s): period_sums(
@@ -141,8 +143,26 @@ def retrieve_part(records: Records, job: ScanJob, campaign: Campaign) -> ScanPar
     return ScanPart(together, sums, series, steps, agreement, gridded.offset_deg)
 
 
-def filter_rays(grid: ScanGrid, filters: Filters) -> tuple[FloatArray, tuple[Step, ...], Agreement]:
+def empty_part() -> ScanPart:
+    """What a part without any ray gives."""
+    nothing = np.empty(0)
+    series = RaySeries(np.empty(0, dtype="datetime64[ns]"), nothing, nothing, nothing)
+    return ScanPart({}, {}, series, (), Agreement(0, 0, 0, 0), 0.0)
+
+
+def filter_rays(
+    grid: ScanGrid, filters: Filters, *, period_s: float
+) -> tuple[FloatArray, tuple[Step, ...], Agreement]:
     """Apply limits, and the automatic filter where it is wanted or a limit is missing.
+
+    Parameters
+    ----------
+    grid
+        Scans of one gate.
+    filters
+        Limits, and how the automatic filter looks at the data.
+    period_s
+        From the start of one scan to the next [s].
 
     Returns
     -------
@@ -163,7 +183,8 @@ def filter_rays(grid: ScanGrid, filters: Filters) -> tuple[FloatArray, tuple[Ste
         speed, steps = done.values, [*steps, done.step]
     agreement = Agreement(0, 0, 0, 0)
     if uses_automatic(filters):
-        window = Window(scans=filters.window_scans, distance=filters.distance)
+        scans = max(round(filters.window_s / period_s), LEAST_WINDOW_SCANS)
+        window = Window(scans=scans, distance=filters.distance)
         before = speed
         done = filter_outliers(before, np.where(np.isfinite(before), cnr, np.nan), window=window)
         agreement = compare_filters(before, limit_cnr(before, cnr, CNR_DB).values, done.values)
@@ -175,6 +196,11 @@ def uses_automatic(filters: Filters) -> bool:
     """Whether the automatic filter runs: asked for, or in place of a limit that is missing."""
     missing = OPEN in (filters.cnr_db or OPEN, filters.radial_speed_mps or OPEN)
     return filters.automatic == "on" or (filters.automatic == "auto" and missing)
+
+
+def judges_fit(filters: Filters) -> bool:
+    """Whether scans are kept or not by how well they fit."""
+    return (filters.residual_std_mps, filters.r_squared, filters.reduced_chi2) != (None, None, None)
 
 
 def periods_of(campaign: Campaign) -> tuple[float, ...]:

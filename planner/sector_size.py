@@ -53,7 +53,8 @@ def _saving(best: SizeError, widest: SizeError) -> str:
         return ""
     reach = bought_range(longer, best.range_m) / best.range_m
     return (
-        f"at the pace of {widest.sector_deg:g}° its rays could last {longer:.2f} times as long: noise falls to {bought_noise(longer):.0%}, "
+        f"at the pace of {widest.sector_deg:g}° its rays could last {longer:.2f} times as long: "
+        f"noise falls to {bought_noise(longer):.0%}, "
         f"or a weak signal reaches {reach:.2f} times as far at the same noise"
     )
 
@@ -76,7 +77,8 @@ def _sentence(best: SizeError, widest: SizeError, tolerance: Tolerance) -> str:
         kept = "the widest computed"
     else:
         kept = (
-            f"the smallest whose slope stays within {tolerance.slope:g} of that at {widest.sector_deg:g}° and whose scatter is at most "
+            f"the smallest whose slope stays within {tolerance.slope:g} of that at {widest.sector_deg:g}° "
+            f"and whose scatter is at most "
             f"{tolerance.scatter_growth:.0%} larger"
         )
     return f"{best.sector_deg:g}°: {kept}; {best.scans_per_10min} scans in ten minutes against {widest.scans_per_10min}"

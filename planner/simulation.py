@@ -18,8 +18,8 @@ from planner.site import Site
 from planner.wind_climate import ROSE_STEP_DEG, climate_at, error_sources, state_like, turbulence
 from reconstruct.averaging import TimeArray
 from reconstruct.radial_speed import power_law_mps
-from reconstruct.records import Records
 from reconstruct.rays import Rays
+from reconstruct.records import Records
 from reconstruct.sweep_ids import sweep_ids
 from reconstruct.virtual import Flown, VirtualScan, VirtualSettings, fly
 from reconstruct.wind import WindState, from_deg, scalar_mean, vector_mean
@@ -254,8 +254,7 @@ def _records(
     order = np.argsort(seconds, kind="stable")
     ray = np.tile(np.arange(rays.count), len(speeds))[order]
     azimuth, elevation = layout.mounting.to_head(layout.scan.azimuth_deg, layout.scan.elevation_deg)
-    range_m = layout.lidar.mounting.range_offset_m
-    gate_m = layout.measured_range_m(layout.range_to_m(layout.targets[0])) - range_m
+    gate_m = float(layout.mounting.head_range_m(layout.measured_range_m(layout.range_to_m(layout.targets[0]))))
     measured, cnr = _with_noise(plan, layout, speeds.ravel()[order], options.lost_share, rng)
     return Records(
         time_utc=begin + (seconds[order] * 1e9).round().astype("timedelta64[ns]"),
@@ -263,7 +262,7 @@ def _records(
         azimuth_deg=azimuth[ray],
         elevation_deg=elevation[ray],
         scan_id=np.zeros(len(ray), dtype=np.intp),
-        sweep_id=sweep_ids(azimuth[ray], elevation[ray]),
+        sweep_id=np.arange(len(ray)),  # numbered when the periods are joined
         range_m=np.array([gate_m]),
         radial_speed_mps=measured[:, None],
         cnr_db=cnr[:, None],
@@ -297,5 +296,7 @@ def joined(parts: Sequence[Records]) -> Records:
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in (*first.ray_fields(), *first.gate_fields())
     }
-    arrays["sweep_id"] = sweep_ids(arrays["azimuth_deg"], arrays["elevation_deg"])
+    azimuth, elevation = arrays["azimuth_deg"], arrays["elevation_deg"]
+    still = np.ptp(azimuth) + np.ptp(elevation) == 0  # every ray of a stare is a pass, so that it can be cut anywhere
+    arrays["sweep_id"] = np.arange(len(azimuth)) if still else sweep_ids(azimuth, elevation)
     return replace(first, **arrays)

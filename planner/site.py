@@ -150,6 +150,8 @@ class Terrain(Noun):
     """A height model of the ground."""
 
     file: Path
+    height_datum: Literal["above_sea_level", "ellipsoidal"] | None = None  # where the file itself does not say
+    surface: Path | None = None  # heights of canopy and buildings above the ground, on the same cells
 
 
 def _file_of_text(value: object) -> object:

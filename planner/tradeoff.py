@@ -5,22 +5,25 @@ exact ellipsoid for geometry, the largest Monte Carlo run for error tiers, the f
 double precision for number formats.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.arrays import FloatArray
-from geometry.beams import beam_to
+from geometry.beams import Beam, beam_to
 from geometry.errors import InputError
 from geometry.frames import EarthModel, model_error_m
-from planner.fidelity import Air
+from planner.fidelity_wind import Air
 from planner.places import Places
-from reconstruct.monte_carlo import Settings, simulate
 from reconstruct.flight import Sampling
-from reconstruct.prediction import predict_linear, predict_noise
+from reconstruct.monte_carlo import Settings, simulate
+from reconstruct.prediction import ScanPrediction, predict_linear, predict_noise
+from reconstruct.spectra import Turbulence
 from reconstruct.turbulent import predict_turbulent
 from reconstruct.verdict import Verdict, judge
 
@@ -49,6 +52,7 @@ class Trade:
 
 
 Progress = Callable[[float], None]
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 def trades(
@@ -61,15 +65,16 @@ def trades(
     places
         The site with its exact frame.
     air
-        Rays, wind and air of the scan to judge error tiers with; None leaves tiers and probe points out.
+        Rays, wind and air of the scan to judge error tiers with; without it or its turbulence, tiers and probe points are
+        left out: every tier is the linear one then.
     rng
         Source of the Monte Carlo's numbers.
     progress
         Gets the share of the work that is done.
     """
     found: list[Trade] = [*geometry_trades(places), *format_trades(places)]
-    if air is not None:
-        found += tier_trades(air, rng=rng, progress=progress)
+    if air is not None and air.turbulence is not None:
+        found += tier_trades(air, air.turbulence, rng=rng, progress=progress)
     return tuple(sorted(found, key=lambda trade: TOPICS.index(trade.topic)))
 
 
@@ -78,7 +83,7 @@ def geometry_trades(places: Places) -> Iterator[Trade]:
     head, points = _points(places)
     targets = np.asarray([places.site.target_position_m(target) for target in places.site.targets])
     for model in MODELS:
-        time_s = _fastest(lambda chosen=model: beam_to(places.frame.enu_m(head, points, model=chosen)))
+        time_s = _fastest(partial(_solve, places, head, points, model))
         worst_m = float(np.max(model_error_m(places.frame, head, targets, model)))
         yield Trade(
             "geometry",
@@ -110,70 +115,79 @@ def format_trades(places: Places) -> Iterator[Trade]:
         yield Trade("number format", method, _fastest(work) / BEAMS, error, "m", note="time of one flat beam")
 
 
-def tier_trades(air: Air, *, rng: np.random.Generator, progress: Progress | None = None) -> Iterator[Trade]:
-    """Time of each error tier and its distance from the judge: the spread of one scan's speed, and its probe points.
-
-    Raises
-    ------
-    InputError
-        If the site declares no turbulence: then every tier is the linear one.
-    """
-    if air.turbulence is None:
-        raise InputError(
-            "the error tiers differ by turbulence, and the site declares none: add wind.turbulence"
+def tier_trades(
+    air: Air, eddies: Turbulence, *, rng: np.random.Generator, progress: Progress | None = None
+) -> Iterator[Trade]:
+    """Time of each error tier and its distance from the judge: the spread of one scan's speed, and its probe points."""
+    periods = sum(REALISATIONS) + REALISATIONS[0] * len(PROBE_POINTS)
+    done = 0
+    runs = []
+    for count in REALISATIONS:
+        runs.append(
+            _run(air, Settings(realisations=count), rng, _part(progress, done / periods, count / periods))
         )
-    state, eddies = air.states[len(air.states) // 2], air.turbulence
-    noise = np.array([each.radial_speed_mps for each in air.sources])[air.rays.lidar]
-    runs = [_run(air, Settings(realisations=count), rng) for count in REALISATIONS]
+        done += count
     truth = runs[-1][1].speed_std_mps
-    for number, (name, work) in enumerate(
-        {
-            "noise": lambda: predict_noise(air.rays, state, noise),
-            "linear": lambda: predict_linear(air.rays, state, air.sources),
-            "turbulent": lambda: predict_turbulent(air.rays, state, eddies, air.sources),
-        }.items()
-    ):
+    for name, work in _closed_forms(air, eddies).items():
         spread = work().speed_std_mps
         error = None if spread is None else abs(spread - truth.value)
         yield Trade("error tier", name, _fastest(work), error, "m/s", truth.standard_error)
-        _tell(progress, (number + 1) / 6)
     for count, (time_s, verdict) in zip(REALISATIONS, runs, strict=True):
-        last = count == REALISATIONS[-1]
-        error = None if last else abs(verdict.speed_std_mps.value - truth.value)
-        yield Trade(
-            "error tier",
-            f"monte-carlo, {count} periods",
-            time_s,
-            error,
-            "m/s",
-            verdict.speed_std_mps.standard_error,
-        )
-    yield from _probe_trades(air, rng)
-    _tell(progress, 1.0)
+        error = None if count == REALISATIONS[-1] else abs(verdict.speed_std_mps.value - truth.value)
+        method = f"monte-carlo, {count} periods"
+        yield Trade("error tier", method, time_s, error, "m/s", verdict.speed_std_mps.standard_error)
+    yield from _probe_trades(air, rng, _part(progress, done / periods, 1 - done / periods))
 
 
-def _probe_trades(air: Air, rng: np.random.Generator) -> Iterator[Trade]:
+def _closed_forms(air: Air, eddies: Turbulence) -> dict[str, Callable[[], ScanPrediction]]:
+    """The tiers that need no chance, by name."""
+    state, sources = air.states[len(air.states) // 2], air.sources
+    noise = np.array([each.radial_speed_mps for each in sources])[air.rays.lidar]
+    return {
+        "noise": partial(predict_noise, air.rays, state, noise),
+        "linear": partial(predict_linear, air.rays, state, sources),
+        "turbulent": partial(predict_turbulent, air.rays, state, eddies, sources),
+    }
+
+
+def _probe_trades(air: Air, rng: np.random.Generator, progress: Progress | None) -> Iterator[Trade]:
     """The same air with ever more points along each probe: one seed, so that only the probe differs."""
     seed = int(rng.integers(2**32))
     found = []
-    for count in PROBE_POINTS:
+    for number, count in enumerate(PROBE_POINTS):
         settings = Settings(realisations=REALISATIONS[0], sampling=Sampling(probe_points=count))
-        found.append(_run(air, settings, np.random.default_rng(seed)))
+        told = _part(progress, number / len(PROBE_POINTS), 1 / len(PROBE_POINTS))
+        found.append(_run(air, settings, np.random.default_rng(seed), told))
     finest = found[-1][1].speed_std_mps.value
     for count, (time_s, verdict) in zip(PROBE_POINTS, found, strict=True):
         error = None if count == PROBE_POINTS[-1] else abs(verdict.speed_std_mps.value - finest)
         yield Trade("probe points", f"{count} a ray", time_s, error, "m/s")
 
 
-def _run(air: Air, settings: Settings, rng: np.random.Generator) -> tuple[float, Verdict]:
+def _run(
+    air: Air, settings: Settings, rng: np.random.Generator, progress: Progress | None
+) -> tuple[float, Verdict]:
     state = air.states[len(air.states) // 2]
     start = perf_counter()
-    verdict = judge(
-        simulate(
-            air.rays, state, rng=rng, sources=tuple(air.sources), turbulence=air.turbulence, settings=settings
-        )
+    simulation = simulate(
+        air.rays,
+        state,
+        rng=rng,
+        sources=tuple(air.sources),
+        turbulence=air.turbulence,
+        settings=settings,
+        progress=progress,
     )
-    return perf_counter() - start, verdict
+    return perf_counter() - start, judge(simulation)
+
+
+def _part(progress: Progress | None, start: float, share: float) -> Progress | None:
+    """Progress of a part of the work, as the whole's."""
+    return None if progress is None else lambda done: progress(min(start + share * done, 1.0))
+
+
+def _solve(places: Places, head: FloatArray, points: FloatArray, model: EarthModel) -> Beam:
+    return beam_to(places.frame.enu_m(head, points, model=model))
 
 
 def _points(places: Places) -> tuple[FloatArray, FloatArray]:
@@ -187,7 +201,7 @@ def _points(places: Places) -> tuple[FloatArray, FloatArray]:
     return np.asarray(site.lidars[0].position, dtype=np.float64), middle + spread
 
 
-def _beams(offset: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _beams(offset: NDArray[Real]) -> tuple[NDArray[Real], ...]:
     """Azimuth, elevation and range [rad, m] in whatever precision comes."""
     east, north, up = offset.T
     level = np.sqrt(east * east + north * north)
@@ -201,8 +215,3 @@ def _fastest(work: Callable[[], object]) -> float:
         work()
         times.append(perf_counter() - start)
     return min(times)
-
-
-def _tell(progress: Progress | None, share: float) -> None:
-    if progress is not None:
-        progress(share)

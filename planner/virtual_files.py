@@ -1,6 +1,8 @@
 """The files of a virtual campaign: rays in a format that the analysis reads, mast, truth, and a campaign file."""
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +18,6 @@ from planner.simulation import (
     Options,
     Part,
     Progress,
-    Virtual,
     campaign_parts,
     joined,
     true_means,
@@ -25,15 +26,32 @@ from planner.simulation import (
 from reconstruct.averaging import period_means
 from reconstruct.records import Records
 
-Format = Literal["csv", "parquet", "store"]
-FORMATS: tuple[Format, ...] = ("csv", "parquet", "store")
-ENDINGS: dict[Format, str] = {"csv": "csv", "parquet": "parquet", "store": "duckdb"}
+Format = Literal["csv", "parquet", "store", "netcdf", "windscanner", "database"]
+FORMATS: tuple[Format, ...] = ("csv", "parquet", "store", "netcdf", "windscanner", "database")
+DATABASE = "rays.sqlite"  # where no url is given
+
+# What the campaign file says of each: kind, and the files of a scan.
+READ_AS: dict[Format, tuple[str, str]] = {
+    "csv": ("csv", "{}-*.csv"),
+    "parquet": ("parquet", "{}-*.parquet"),
+    "store": ("store", "{}.duckdb"),
+    "netcdf": ("cfradial", "{}-*.nc"),
+    "windscanner": ("windscanner", "{}_*_wind.txt"),
+    "database": ("database", DATABASE),
+}
 
 MAST_PERIOD_S = 60.0
 
 
 def write_virtual(
-    plan: Plan, site_text: str, out: Path, *, options: Options, kind: Format = "csv", progress: Progress | None = None
+    plan: Plan,
+    site_text: str,
+    out: Path,
+    *,
+    options: Options,
+    kind: Format = "csv",
+    url: str | None = None,
+    progress: Progress | None = None,
 ) -> list[Path]:
     """Simulate a campaign and write it, a file a day and scan, with mast, truth, site and campaign file.
 
@@ -49,6 +67,10 @@ def write_virtual(
         Days, seed, share of lost rays.
     kind
         Format of the rays.
+    url
+        Of a database, as SQLAlchemy writes it, variables of the environment included; default: an SQLite file
+        in the folder. Other than a folder it keeps what an interrupted run has written, as scenarios of their
+        own.
     progress
         Gets the share that is done.
 
@@ -56,43 +78,44 @@ def write_virtual(
     -------
     list of Path
         The campaign file first.
+
+    Raises
+    ------
+    InputError
+        If a url is given for files, or a database refuses.
     """
+    if url is not None and kind != "database":
+        raise InputError(f"--url came with --format {kind}: it belongs to --format database")
     campaign = virtual(plan, options)
     with output_folder(out) as folder:
+        rays = _RayWriter(plan, folder, kind, url)
         parts = _watched(campaign_parts(campaign, plan, options), len(campaign.states), progress)
-        for number, day in enumerate(_days(parts)):
+        for day in _days(parts):
             for layout in campaign.layouts:
-                records = joined([part.records[layout.name] for part in day])
-                _write_rays(records, folder, f"{file_name(layout.name)}", number, kind)
+                rays.write(layout.name, joined([part.records[layout.name] for part in day]))
             _append_mast(folder / "mast.csv", [part.mast for part in day])
             _append(folder / "truth.csv", [true_means(part) for part in day])
         (folder / "site.yaml").write_text(site_text, encoding="utf-8")
-        (folder / "campaign.yaml").write_text(campaign_text(plan, campaign, kind), encoding="utf-8")
+        text = campaign_text(plan, {layout.name: rays.told(layout.name) for layout in campaign.layouts})
+        (folder / "campaign.yaml").write_text(text, encoding="utf-8")
         names = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
     return [out / "campaign.yaml", *(out / name for name in names if name.name != "campaign.yaml")]
 
 
-def campaign_text(plan: Plan, campaign: Virtual, kind: Format) -> str:
-    """The campaign file that goes with the data."""
-    ending = ENDINGS[kind]
-    where = {
-        layout.name: f"{file_name(layout.name)}.duckdb" if kind == "store" else f"{file_name(layout.name)}-*.{ending}"
-        for layout in campaign.layouts
-    }
-    inputs = "\n".join(
-        f"  - {{scan: {_quoted(name)}, kind: {kind}, path: {_quoted(path)}}}" for name, path in where.items()
-    )
-    pairs = [pair for pair in plan.site.pairs if len(pair.scans) == 2 and set(pair.scans) <= set(where)]
+def campaign_text(plan: Plan, inputs: Mapping[str, str]) -> str:
+    """The campaign file that goes with the data; `inputs` tells of each scan where its rays are."""
+    listed = "\n".join(f"  - {{scan: {_quoted(name)}, {told}}}" for name, told in inputs.items())
+    pairs = [pair for pair in plan.site.pairs if len(pair.scans) == 2 and set(pair.scans) <= set(inputs)]
     lines = [
         "# A virtual campaign: `lidarplan retrieve` this file, then `lidarplan compare` it.",
         f"name: {_quoted(plan.site.name)}",
         "site: site.yaml",
-        f"inputs:                          # angles are the head's; the site file's offsets turn them\n{inputs}",
+        f"inputs:                          # angles are the head's; the site file's offsets turn them\n{listed}",
     ]
     if pairs:
         lines.append(f"pairs: [{', '.join(_quoted(pair.name) for pair in pairs)}]")
     lines += [
-        "filters: {automatic: on}         # limits, such as cnr_db: [-25, -5], would take the automatic filter's place",
+        "filters: {automatic: on}         # limits, such as cnr_db: [-25, -5], can be given beside it",
         "selection:                       # every period was drawn from the wind that counts: nothing more is left out",
         "  directions_deg: all",
         "  every_speed: true",
@@ -101,6 +124,65 @@ def campaign_text(plan: Plan, campaign: Virtual, kind: Format) -> str:
         "output: results",
     ]
     return "\n".join(lines) + "\n"
+
+
+class _RayWriter:
+    """Writes rays in one format, and knows how the campaign file has to tell of them."""
+
+    def __init__(self, plan: Plan, folder: Path, kind: Format, url: str | None) -> None:
+        self._plan, self._folder, self._kind, self._url = plan, folder, kind, url
+        self._days: dict[str, int] = {}
+        self._scenarios: dict[str, list[int]] = {}
+
+    def write(self, scan: str, records: Records) -> None:
+        """Write the rays of one scan and day."""
+        from reconstruct.formats.cf_write import write_netcdf
+        from reconstruct.formats.windscanner_write import write_windscanner
+        from reconstruct.record_tables import to_long, write_parquet
+        from reconstruct.store import write_store
+
+        number = self._days.setdefault(scan, 0)
+        self._days[scan] += 1
+        name = READ_AS[self._kind][1].format(file_name(scan)).replace("*", f"{number:04d}")
+        path = self._folder / name
+        match self._kind:
+            case "csv":
+                to_long(records).to_csv(path, index=False, float_format="%.6f", encoding="utf-8")
+            case "parquet":
+                write_parquet(records, path)
+            case "store":
+                write_store(path, records)
+            case "netcdf":
+                write_netcdf(records, path)
+            case "windscanner":
+                path.write_text(write_windscanner(records), encoding="utf-8")
+            case "database":
+                self._write_scenario(scan, records)
+
+    def told(self, scan: str) -> str:
+        """What the campaign file says of a scan's rays, after its name."""
+        kind, pattern = READ_AS[self._kind]
+        if self._kind != "database":
+            stored = ", azimuth: stored" if kind == "windscanner" else ""
+            return f"kind: {kind}, path: {_quoted(pattern.format(file_name(scan)))}{stored}"
+        where = f"path: {DATABASE}" if self._url is None else f"url: {_quoted(self._url)}"
+        return f"kind: database, {where}, scenarios: {self._scenarios[scan]}"
+
+    def _write_scenario(self, scan: str, records: Records) -> None:
+        from reconstruct.formats.aas_write import write_aas
+        from reconstruct.formats.aas_scenarios import next_scenario
+
+        place = self._folder / DATABASE if self._url is None else os.path.expandvars(self._url)
+        number = next_scenario(place)
+        layout = self._plan.layout[scan]
+        write_aas(
+            replace(records, scan_id=np.full(records.rays, number)),
+            place,
+            scan_type="LOS" if layout.spec.type == "stare" else "PPI",
+            pulse_ns=layout.probe.pulse_ns,
+            fft_points=round(layout.probe.window_ns / layout.lidar.device.sample_ns),
+        )
+        self._scenarios.setdefault(scan, []).append(number)
 
 
 def _quoted(text: str) -> str:
@@ -127,21 +209,6 @@ def _days(parts: Iterator[Part]) -> Iterator[list[Part]]:
             day = []
     if day:
         yield day
-
-
-def _write_rays(records: Records, folder: Path, name: str, number: int, kind: Format) -> None:
-    from reconstruct.record_tables import to_long, write_parquet
-    from reconstruct.store import write_store
-
-    path = folder / f"{name}-{number:04d}.{ENDINGS[kind]}"
-    if kind == "csv":
-        to_long(records).to_csv(path, index=False, float_format="%.6f", encoding="utf-8")
-    elif kind == "parquet":
-        write_parquet(records, path)
-    elif kind == "store":
-        write_store(folder / f"{name}.duckdb", records)
-    else:
-        raise InputError(f"--format {kind} came; allowed: {', '.join(FORMATS)}")
 
 
 def _append_mast(path: Path, samples: Sequence[MastSamples]) -> None:

@@ -10,11 +10,12 @@ moving-window filters that Alcayaga (2020, Atmos. Meas. Tech. 13, 6237-6254, doi
 compares with. CNR counts on its low side only: a strong echo is a hard target, which limits are for.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
+from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.filters import Filtered, keep
 
@@ -62,9 +63,9 @@ def filter_outliers(
 
     Notes
     -----
-    Medians and deviations are taken over windows that overlap by half, and interpolated in time between the
-    windows' middles. With s the robust standard deviations, a ray is kept where
-    (Δv/s_v)² + (min(ΔCNR, 0)/s_c)² <= distance².
+    Windows overlap by half, so that a ray lies in two of them. In each, with s the robust standard deviations
+    there, its distance is d² = (Δv/s_v)² + (min(ΔCNR, 0)/s_c)²; it is kept where d is small enough in either: at
+    a front, a ray belongs to what came before or to what comes after.
 
     Examples
     --------
@@ -80,11 +81,15 @@ def filter_outliers(
         )
     if window.scans < 3:
         raise InputError(f"a window of {window.scans} scans came: 3 or more are needed for a median")
-    distance = np.square(_deviation(speed, window.scans, window.least_speed_std_mps))
-    if cnr_db is not None:
-        faint = np.minimum(_deviation(np.asarray(cnr_db, float), window.scans, window.least_cnr_std_db), 0.0)
-        distance = distance + np.square(np.where(np.isfinite(faint), faint, 0.0))
-    return keep(speed, distance <= window.distance**2, "automatic")
+    cnr = None if cnr_db is None else np.where(np.isfinite(speed), np.asarray(cnr_db, dtype=float), np.nan)
+    nearest = np.full(speed.shape, np.inf)
+    for part in _windows(len(speed), window.scans):
+        distance = np.square(_deviation(speed[part], window.least_speed_std_mps))
+        if cnr is not None:
+            faint = np.minimum(_deviation(cnr[part], window.least_cnr_std_db), 0.0)
+            distance += np.square(np.where(np.isfinite(faint), faint, 0.0))
+        nearest[part] = np.fmin(nearest[part], distance)
+    return keep(speed, nearest <= window.distance**2, "automatic")
 
 
 class Agreement(NamedTuple):
@@ -110,40 +115,25 @@ def compare_filters(before: FloatArray, limits: FloatArray, automatic: FloatArra
     return Agreement(*(int(np.count_nonzero(part & there)) for part in parts))
 
 
-def _deviation(values: FloatArray, scans: int, least: float) -> FloatArray:
-    """(scan, ray) distance from the neighbourhood's median in its robust standard deviations."""
-    count = len(values)
-    starts = _starts(count, scans)
-    medians = np.stack([_median(values[start : start + scans]) for start in starts])  # (window, ray)
-    middles = starts + (np.minimum(starts + scans, count) - starts - 1) / 2
-    centre = _between(middles, medians, count)
-    off = values - centre
-    spread = [_median(np.abs(off[start : start + scans]).reshape(-1, 1))[0] for start in starts]
-    scale = np.maximum(MAD_TO_STD * _between(middles, np.array(spread)[:, None], count), least)
-    return np.asarray(off / scale)
+def _deviation(values: FloatArray, least: float) -> FloatArray:
+    """(scan, ray) distance from the median of each column in robust standard deviations of all of them."""
+    off = values - _median(values)
+    spread = float(_median(np.abs(off).reshape(-1, 1))[0])
+    return off / max(MAD_TO_STD * spread, least)
 
 
-def _starts(count: int, scans: int) -> FloatArray:
-    """First scans of windows that overlap by half; the last one ends with the data."""
-    if count <= scans:
-        return np.zeros(1, dtype=np.intp)
-    return np.unique(np.append(np.arange(0, count - scans, max(scans // 2, 1)), count - scans))
-
-
-def _between(middles: FloatArray, values: FloatArray, count: int) -> FloatArray:
-    """(scan, column) values at windows' middles, interpolated over the scans; windows without data are passed over."""
-    out = np.full((count, values.shape[1]), np.nan)
-    scan = np.arange(count)
-    for column, known in enumerate(np.isfinite(values).T):
-        if np.any(known):
-            out[:, column] = np.interp(scan, middles[known], values[known, column])
-    return out
+def _windows(count: int, scans: int) -> Iterator[slice]:
+    """Windows that overlap by half; the last one ends with the data."""
+    step = max(scans // 2, 1)
+    for start in range(0, max(count - scans, 0), step):
+        yield slice(start, start + scans)
+    yield slice(max(count - scans, 0), count)
 
 
 def _median(values: FloatArray) -> FloatArray:
     """(column,) median of what is there; NaN where nothing is (numpy's nanmedian warns there)."""
     ordered = np.sort(values, axis=0)  # NaN last
-    count: BoolArray | FloatArray = np.count_nonzero(np.isfinite(values), axis=0)
+    count = np.count_nonzero(np.isfinite(values), axis=0)
     low, high = np.maximum((count - 1) // 2, 0), count // 2
     column = np.arange(values.shape[1])
     middle = (ordered[low, column] + ordered[np.minimum(high, len(values) - 1), column]) / 2

@@ -17,12 +17,17 @@ import numpy as np
 from geometry.arrays import ArrayLike, BoolArray, FloatArray
 from geometry.errors import InputError
 from reconstruct.climate import Climate
-from reconstruct.lidar_map import beam_view, radial_variance_m2s2
+from reconstruct.lidar_map import radial_variance_m2s2
+from reconstruct.responses import View
 from reconstruct.uncertainty import ErrorSources
 from reconstruct.wind import WindState, uv_mps
 
 Criterion = Literal["vector", "speed", "direction"]
 """What is to be small: the error of the wind vector [m/s], of its speed [m/s], or of its direction [deg]."""
+
+
+CHUNK = 2**14
+"""Beams that are worked on at once: their columns stay in the processor's cache."""
 
 
 class BeamTable(NamedTuple):
@@ -80,7 +85,6 @@ def beam_table(
     sources: ErrorSources,
     *,
     criterion: Criterion = "vector",
-    ground_m: float = 0.0,
     seen: BoolArray | None = None,
     noise_mps: ArrayLike | None = None,
 ) -> BeamTable:
@@ -100,8 +104,6 @@ def beam_table(
         What can be wrong with the lidar.
     criterion : {"vector", "speed", "direction"}
         Whose error.
-    ground_m : float
-        Height of the ground in the frame [m].
     seen : numpy.ndarray, optional
         (target, candidate) False where the candidate cannot measure the target; default: everywhere True.
     noise_mps : array_like, optional
@@ -134,53 +136,101 @@ def beam_table(
             f"{len(targets)} targets came with {len(climates)} climates and {len(like)} states: give one each"
         )
     shape = (len(targets), len(heads))
-    east, north, cosine, tensor = np.empty(shape), np.empty(shape), np.empty(shape), np.empty((3, *shape))
     noise = np.broadcast_to(np.asarray(sources.radial_speed_mps if noise_mps is None else noise_mps, float), shape)
-    quiet = replace(sources, radial_speed_mps=0.0)
-    for number, (target, climate, state) in enumerate(zip(targets, climates, like, strict=True)):
-        states = condensed(climate, state, criterion)
-        parts = _beams(heads, target, states, state, quiet, noise[number], criterion, ground_m)
-        east[number], north[number], cosine[number], tensor[:, number] = parts
+    states = _states([condensed(*pair, criterion) for pair in zip(climates, like, strict=True)], like)
+    out = np.empty((6, *shape))
+    step = max(CHUNK // len(targets), 1)
+    for start in range(0, len(heads), step):
+        part = slice(start, start + step)
+        out[:, :, part] = _beams(heads[part], targets, states, replace(sources, radial_speed_mps=0.0), noise[:, part], criterion)
     clear = np.ones(shape, dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
-    return BeamTable(east, north, cosine, tensor, clear)
+    return BeamTable(out[0], out[1], out[2], out[3:], clear)
+
+
+class _States(NamedTuple):
+    """States of the wind at every target, each (state, target); where a target has fewer, the rest weigh nothing."""
+
+    weight: FloatArray
+    speed_mps: FloatArray
+    from_deg: FloatArray
+    shear_exponent: FloatArray  # (target,), as all below
+    height_m: FloatArray
+    vertical_mps: FloatArray
+    lateral_per_s: float
+
+
+def _states(climates: Sequence[Climate], like: Sequence[WindState]) -> _States:
+    most = max(climate.count for climate in climates)
+    weight, speed, angle = np.zeros((most, len(climates))), np.ones((most, len(climates))), np.zeros((most, len(climates)))
+    for number, climate in enumerate(climates):
+        weight[: climate.count, number] = climate.weight
+        speed[: climate.count, number] = climate.speed_mps
+        angle[: climate.count, number] = climate.from_deg
+    lateral = {state.lateral_gradient_per_s for state in like}
+    if len(lateral) > 1:
+        raise InputError(f"lateral gradients {sorted(lateral)} came; all targets share one")
+    others = (np.array([getattr(state, name) for state in like]) for name in ("shear_exponent", "height_m", "vertical_mps"))
+    return _States(weight, speed, angle, *others, lateral_per_s=lateral.pop())
 
 
 def _beams(
     heads: FloatArray,
-    target: FloatArray,
-    climate: Climate,
-    like: WindState,
+    targets: FloatArray,
+    states: _States,
     quiet: ErrorSources,
     noise_mps: FloatArray,
     criterion: Criterion,
-    ground_m: float,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """East and north of the level beam and its cosine (candidate,), and the tensor (3, candidate), of one target."""
-    tensor = np.zeros((3, len(heads)))
-    height = target[2] - ground_m
-    view = None
-    for weight, state in zip(climate.weight, climate.states(like), strict=True):
-        speed = state.speed_mps * (height / state.height_m) ** state.shear_exponent
-        point = [np.full(len(heads), value) for value in (*target, speed, state.shear_exponent * speed / height)]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            view = beam_view(heads.T, point, state)
-            variance = weight * (noise_mps**2 + radial_variance_m2s2(view, quiet)) / view.cos_elevation**2
-        for number, part in enumerate(_wanted_part(state, speed, criterion)):
-            tensor[number] += part * variance
-    if view is None:
-        raise InputError("the climate has no state")
-    return view.sin_azimuth, view.cos_azimuth, view.cos_elevation, tensor
+) -> FloatArray:
+    """East and north of the level beam, cosine of its elevation, and the three of the tensor: (6, target, candidate)."""
+    away = targets[:, :, None] - heads.T  # (target, 3, candidate)
+    level = np.hypot(away[:, 0], away[:, 1])
+    distance = np.hypot(level, away[:, 2])
+    out = np.zeros((6, *level.shape))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        out[0], out[1], out[2] = away[:, 0] / level, away[:, 1] / level, level / distance
+        sine = away[:, 2] / distance
+        for weight, speed, angle in zip(states.weight, states.speed_mps, states.from_deg, strict=True):
+            along = np.stack(uv_mps(1.0, angle))[..., None]  # (2, target, 1)
+            view = _view(out, sine, distance, along, speed[:, None], states)
+            variance = weight[:, None] * (noise_mps**2 + radial_variance_m2s2(view, quiet))
+            for number, part in enumerate(_wanted_part(along, speed[:, None], criterion), start=3):
+                out[number] += part * variance
+        out[3:] /= out[2] ** 2
+    return out
 
 
-def _wanted_part(state: WindState, speed: float, criterion: Criterion) -> tuple[float, float, float]:
+def _view(
+    beam: FloatArray, sine: FloatArray, distance: FloatArray, along: FloatArray, speed: FloatArray, states: _States
+) -> View:
+    """Beams and the air in their gates, (target, candidate)."""
+    east, north = beam[0] * beam[2], beam[1] * beam[2]
+    gradient = speed * (states.shear_exponent / states.height_m)[:, None]
+    return View(
+        sin_azimuth=beam[0],
+        cos_azimuth=beam[1],
+        sin_elevation=sine,
+        cos_elevation=beam[2],
+        east=east,
+        north=north,
+        range_m=distance,
+        u_mps=along[0] * speed,
+        v_mps=along[1] * speed,
+        w_mps=states.vertical_mps[:, None],
+        shear_per_s=(along[0] * east + along[1] * north) * gradient,
+        lateral_per_s=states.lateral_per_s,
+        downwind=(along[0], along[1]),
+    )
+
+
+def _wanted_part(along: FloatArray, speed: FloatArray, criterion: Criterion) -> tuple[FloatArray, ...]:
     """ee, en, nn of a aᵀ: along the wind for its speed, across it (over the speed) for its direction, both for all."""
-    along_east, along_north = (float(part) for part in uv_mps(1.0, state.from_deg))
+    east, north = along
     if criterion == "speed":
-        return along_east**2, along_east * along_north, along_north**2
+        return east * east, east * north, north * north
     if criterion == "direction":
         scale = np.degrees(1.0 / speed) ** 2
-        return scale * along_north**2, -scale * along_east * along_north, scale * along_east**2
-    return 1.0, 0.0, 1.0
+        return scale * north * north, -scale * east * north, scale * east * east
+    return np.ones_like(east), np.zeros_like(east), np.ones_like(east)
 
 
 def pair_variance(first: BeamTable, second: BeamTable, target: int) -> tuple[FloatArray, FloatArray]:

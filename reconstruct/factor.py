@@ -96,11 +96,15 @@ def factorise(
         np.multiply(root_weights, column, out=weighted)
     basis, triangle = _orthogonalise(list(memory[1:]), memory[0])
     smallest = RANK_TOLERANCE * np.sqrt(dot(root_weights, root_weights))
-    short = np.asarray(np.any([~(triangle[k, k] > smallest) for k in range(len(basis))], axis=0))
+    short = np.asarray(~(triangle[0, 0] > smallest))
+    for k in range(1, len(basis)):
+        short = short | ~(triangle[k, k] > smallest)
     with np.errstate(divide="ignore", invalid="ignore"):
         spread = _turn_back(_triangle_inverse(triangle), axis)
-        condition = np.where(short, np.inf, _condition(triangle))
-    spread[..., short] = np.nan
+        condition = _condition(triangle)
+    if np.any(short):
+        condition = np.where(short, np.inf, condition)
+        spread[..., short] = np.nan
     return Factor(basis, spread, condition, short)
 
 
@@ -185,15 +189,15 @@ def _half_angle(sine: FloatArray, cosine: FloatArray) -> FloatArray:
     """(2, ...) sine and cosine of half the angle of a vector of any length: tan(a/2) = sin a / (1 + cos
     a).
     """
-    small = np.sqrt(sine * sine + cosine * cosine)
+    small = np.asarray(np.sqrt(sine * sine + cosine * cosine))
     small += np.abs(cosine)
     np.divide(sine, np.maximum(small, _TINY), out=small)
     large = 1 / np.sqrt(1 + small * small)
-    small *= large
+    small = small * large
     near, out = cosine >= 0, np.empty((2, *small.shape))
     out[0], out[1] = large, small
-    np.copyto(out[0], small, where=near)
-    np.copyto(out[1], large, where=near)
+    np.copyto(out[0, ...], small, where=near)
+    np.copyto(out[1, ...], large, where=near)
     return out
 
 

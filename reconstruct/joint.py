@@ -80,7 +80,7 @@ def expand(mean_mps: FloatArray, covariance_m2s2: FloatArray) -> Speed:
     first = along[..., 0, None] + spread[..., 0, None] * nodes
     second = along[..., 1, None] + spread[..., 1, None] * nodes
     speed = np.hypot(first[..., :, None], second[..., None, :])
-    coefficients = np.einsum("ai,...ij,bj->...ab", basis, speed, basis, optimize=True)
+    coefficients = basis @ speed @ basis.T
     level = _exact_where_wide(mean, covariance, spread[..., -1], coefficients[..., 0, 0])
     square = np.sum(mean**2, axis=-1) + np.trace(covariance, axis1=-2, axis2=-1)
     inverse = np.where(spread > 0, 1 / np.where(spread > 0, spread, 1.0), 0.0)

@@ -94,10 +94,15 @@ def pair_map(
     out = PairMap(*(np.empty(targets[0].shape) for _ in PairMap._fields))
 
     for index in blocks(out.condition.shape, CHUNK):
-        part = _pair_chunk(heads, [values[index] for values in targets], wind, each)
+        part = _pair_chunk(heads, [_once(values[index]) for values in targets], wind, each)
         for whole, values in zip(out, part, strict=True):
             whole[index] = values
     return out
+
+
+def _once(values: FloatArray) -> FloatArray:
+    """Cut axes along which an array only repeats itself down to one element: they broadcast again for free."""
+    return values[tuple(slice(1) if step == 0 else slice(None) for step in values.strides)]
 
 
 def _pair_chunk(

@@ -172,9 +172,29 @@ def gain(rows: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:
     array([[0., 1.],
            [1., 0.]])
     """
+    return fit(rows, weights).gain
+
+
+class Fit(NamedTuple):
+    """What a fit does with radial speeds, before there are any."""
+
+    gain: FloatArray  # (..., col, ray) wind = gain · radial speeds; NaN where the rank is short
+    condition: FloatArray  # (...,) of the weighted rows; inf where the rank is short
+
+
+def fit(rows: ArrayLike, weights: ArrayLike | None = None) -> Fit:
+    """Gain and condition of a fit from one factorisation: see `gain` and `condition`.
+
+    Examples
+    --------
+    >>> both = fit(rows([0.0, 90.0], 0.0))
+    >>> both.gain.round(3) + 0.0, round(float(both.condition), 3)
+    (array([[0., 1.],
+           [1., 0.]]), 1.0)
+    """
     factor, root = _factor_of(rows, weights)
     weighted = np.stack([unit * root for unit in factor.basis])
-    return np.asarray(np.einsum("ik...,kr...->...ir", factor.spread, weighted))
+    return Fit(np.asarray(np.einsum("ik...,kr...->...ir", factor.spread, weighted)), factor.condition)
 
 
 def condition(rows: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:

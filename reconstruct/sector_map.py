@@ -28,7 +28,6 @@ def sector_variance(
     sources: ErrorSources,
     *,
     criterion: Criterion = "vector",
-    ground_m: float = 0.0,
     noise_mps: ArrayLike | None = None,
 ) -> FloatArray:
     """Linear-tier variance of one sector scan centred on a target, from every one of many heads.
@@ -48,8 +47,6 @@ def sector_variance(
         The wind at the target and what can be wrong with the lidar, as for `beam_table`.
     criterion : {"vector", "speed", "direction"}
         Whose error.
-    ground_m : float
-        Height of the ground in the frame [m].
     noise_mps : array_like, optional
         Standard deviation of the radial speed, where it depends on the range: broadcast to (candidate,).
 
@@ -77,7 +74,7 @@ def sector_variance(
     step = max(CHUNK // len(offsets), 1)
     for start in range(0, len(heads), step):
         part = slice(start, start + step)
-        out[part] = _variance(heads[part], target, offsets, states, like, sources, noise[part], criterion, ground_m)
+        out[part] = _variance(heads[part], target, offsets, states, like, sources, noise[part], criterion)
     return out
 
 
@@ -90,7 +87,6 @@ def _variance(
     sources: ErrorSources,
     noise_mps: FloatArray,
     criterion: Criterion,
-    ground_m: float,
 ) -> FloatArray:
     away = target - heads
     level = np.hypot(away[:, 0], away[:, 1])
@@ -100,11 +96,11 @@ def _variance(
         fit = np.moveaxis(gain(rows(azimuth, elevation)), 0, -1)  # (col, ray, candidate)
     angle = np.radians(azimuth.T)
     ends = heads.T[:2, None] + level * np.stack([np.sin(angle), np.cos(angle)])
-    height = target[2] - ground_m
     total = np.zeros(len(heads))
     for weight, state in zip(climate.weight, climate.states(like), strict=True):
-        speed = state.speed_mps * (height / state.height_m) ** state.shear_exponent
-        filled = [np.full(angle.shape, value) for value in (target[2], speed, state.shear_exponent * speed / height)]
+        speed = state.speed_mps
+        shear = state.shear_exponent * speed / state.height_m
+        filled = [np.full(angle.shape, value) for value in (target[2], speed, shear)]
         with np.errstate(invalid="ignore", divide="ignore"):
             view = beam_view(heads.T[:, None], [*ends, *filled], state)
         along = np.stack([float(part) for part in uv_mps(1.0, state.from_deg)])

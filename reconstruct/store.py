@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 #: Radial speeds in a chunk: with every quantity there some 250 MB.
 CHUNK_VALUES = 4_000_000
 
+#: Columns of rays that are never missing.
+_WHOLE = ("time_utc", "scan_id", "sweep_id")
+
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS block (block INTEGER, instrument VARCHAR, fields VARCHAR, notes VARCHAR);
 CREATE TABLE IF NOT EXISTS gate (block INTEGER, gate INTEGER, range_m DOUBLE);
@@ -284,7 +287,7 @@ def _read(
         ranges, chosen, where = ranges[gate : gate + 1], "AND gate = ?", [*where, gate]
     within = "WHERE block = ? AND ray >= ? AND ray < ?"
     names = [name for name in RAY_FIELDS if name in fields]
-    table = connection.execute(
+    table: dict[str, Any] = connection.execute(
         f"SELECT {', '.join(names)} FROM ray {within} ORDER BY ray", where[:3]
     ).fetchnumpy()
     quantities = [name for name in GATE_FIELDS if name in fields]
@@ -294,15 +297,18 @@ def _read(
     cell = (values["ray"] - start) * len(ranges) + (values["gate"] if range_m is None else 0)
     shape = (stop - start, len(ranges))
     grids: dict[str, Any] = {name: _grid(values[name], cell, shape) for name in quantities}
-    return Records(
-        range_m=ranges, instrument=block.instrument, notes=tuple(json.loads(notes_text)), **table, **grids
-    )
+    rays: dict[str, Any] = {
+        name: column if name in _WHOLE else np.ma.filled(column, np.nan) for name, column in table.items()
+    }
+    notes = tuple(json.loads(notes_text))
+    return Records(range_m=ranges, instrument=block.instrument, notes=notes, **rays, **grids)
 
 
 def _grid(values: FloatArray, cell: IntArray, shape: tuple[int, int]) -> FloatArray:
     """Values in their cells; as they come where the store gives them in order, as it nearly always does."""
+    values = np.ma.filled(values, np.nan)  # DuckDB takes the NaN of a data frame for NULL
     if len(values) == shape[0] * shape[1] and bool(np.all(cell[1:] > cell[:-1])):
-        return np.asarray(values).reshape(shape)
+        return values.reshape(shape)
     out = np.full(shape[0] * shape[1], np.nan)
     out[cell] = values
     return out.reshape(shape)

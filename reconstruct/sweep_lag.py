@@ -30,6 +30,13 @@ LARGEST_NOISE_MPS = 1.0
 LEAST_SWEEPS = 3
 
 
+#: The slope of a profile is taken over this many rays to each side.
+SLOPE_RAYS = 3
+
+#: Gauss-Newton steps: each leaves a small part of the error of the one before.
+MOST_STEPS = 20
+
+
 class SweepLead(NamedTuple):
     """How far the stamps lead the rays."""
 
@@ -66,6 +73,65 @@ def without_lead(records: Records, lead_deg: float) -> Records:
     """The same records with every azimuth turned back by a lead in the direction of its sweep [deg]."""
     turned = records.azimuth_deg - lead_deg * np.sign(sweep_rate(records))
     return replace(records, azimuth_deg=np.asarray(wrap_360_deg(turned)))
+
+
+def evened(records: Records) -> tuple[Records, int]:
+    """The same records with azimuths that run evenly in time within each sweep.
+
+    A head that sweeps turns at a constant speed, yet a unit's stamps may lead in one part of a sweep and not
+    in the other (one step is skipped on the way). Each sweep gets the line in time, at the usual speed, that
+    most of its stamps lie on. One that is shorter than half begins where its neighbour's line turns.
+
+    Parameters
+    ----------
+    records : Records
+        A sector that is swept to and fro.
+
+    Returns
+    -------
+    records : Records
+        As they came where stamps do not lie on lines.
+    moved : int
+        Rays whose azimuth changes by more than a quarter of a step.
+    """
+    seconds = (records.time_utc - records.time_utc[:1]) / np.timedelta64(1, "s")
+    sweeps = [rays for rays in sweeps_of(records) if len(rays) > 1]
+    unwrapped = [np.unwrap(records.azimuth_deg[rays], period=360.0) for rays in sweeps]
+    if not sweeps:
+        return records, 0
+    steps = np.abs(np.concatenate([np.diff(angle) for angle in unwrapped]))
+    spans = np.concatenate([np.diff(seconds[rays]) for rays in sweeps])
+    step, rate = float(np.median(steps)), float(np.median(steps / np.maximum(spans, 1e-9)))
+    ways = [float(np.sign(angle[-1] - angle[0])) for angle in unwrapped]
+    starts = [
+        float(np.median(angle - way * rate * seconds[rays]))
+        for rays, angle, way in zip(sweeps, unwrapped, ways, strict=True)
+    ]
+    starts = _starts_of_short(starts, ways, [len(rays) for rays in sweeps])
+    even = records.azimuth_deg.copy()
+    for rays, way, start in zip(sweeps, ways, starts, strict=True):
+        even[rays] = start + way * rate * seconds[rays]
+    change = np.abs((even - records.azimuth_deg + 180.0) % 360.0 - 180.0)
+    if np.median(change) > step / 4:
+        return records, 0
+    return replace(records, azimuth_deg=np.asarray(wrap_360_deg(even))), int(np.sum(change > step / 4))
+
+
+def _starts_of_short(starts: Sequence[float], ways: Sequence[float], counts: Sequence[int]) -> list[float]:
+    """Intercepts of the sweeps' lines, those of short sweeps set so that they turn where whole ones do."""
+    whole = [count >= max(counts) / 2 for count in counts]
+    turns: dict[float, list[float]] = {1.0: [], -1.0: []}  # angle at which a sweep of that direction ends
+    for i in range(len(starts) - 1):
+        if whole[i] and whole[i + 1] and ways[i] == -ways[i + 1] != 0:
+            turns[ways[i]].append((starts[i] + starts[i + 1]) / 2)  # two lines of opposite slope cross there
+    out = list(starts)
+    for i, neighbour in ((0, 1), (len(starts) - 1, len(starts) - 2)):
+        if len(starts) < 3 or whole[i] or not whole[neighbour] or ways[i] != -ways[neighbour]:
+            continue
+        ends = turns[ways[min(i, neighbour)]]
+        if ends:
+            out[i] = 2 * float(np.median(ends)) - starts[neighbour]
+    return out
 
 
 def estimate_lead(records: Records) -> SweepLead:
@@ -158,28 +224,62 @@ def _gate_weights(sweeps: Sequence[_Sweep]) -> FloatArray:
 def _best(
     sweeps: Sequence[_Sweep], weight: FloatArray, step_deg: float, *, near: float | None = None
 ) -> float:
-    """Lead [deg] that makes the mean profiles of the two directions differ least, everywhere or near one."""
-    from scipy.optimize import minimize_scalar
+    """Lead [deg] that brings the mean profiles of the two directions on top of each other.
 
+    First the smallest misfit of a coarse search, or one that is given; then Gauss-Newton steps to where the
+    difference of the profiles is orthogonal to their slope. The smallest misfit itself would favour leads of
+    half a step, where interpolation averages the noise of two rays.
+    """
     reach = LARGEST_LEAD_STEPS * step_deg
     low = max(sweep.azimuth_deg[0] for sweep in sweeps) + reach
     high = min(sweep.azimuth_deg[-1] for sweep in sweeps) - reach
-    if high - low < 2 * step_deg:
-        reach = (high - low + 2 * reach) / 4  # a short sector: smaller leads only
+    if high - low < 2 * step_deg:  # a short sector: smaller leads only
+        reach = (high - low + 2 * reach) / 4
         low, high = low - reach, high + reach
     grid = np.arange(low, high, step_deg)
-
-    def misfit(lead_deg: float) -> float:
-        sides = [_mean_profile(sweeps, way, grid + way * lead_deg) for way in (1.0, -1.0)]
-        square = np.square(sides[0] - sides[1])
-        known = np.isfinite(square)
-        return float(np.sum(np.where(known, square, 0.0) * weight) / max(np.sum(known * weight), 1e-12))
-
     if near is None:
         coarse = np.linspace(-reach, reach, 13)
-        near = float(coarse[np.argmin([misfit(float(lead)) for lead in coarse])])
-    bounds = (near - step_deg, near + step_deg)
-    return float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3}).x)
+        near = float(coarse[np.argmin([_misfit(sweeps, weight, grid, float(lead)) for lead in coarse])])
+    lead = near
+    for _ in range(MOST_STEPS):
+        change = _newton_step(sweeps, weight, grid, lead)
+        lead = float(np.clip(lead + change, -reach, reach))
+        if abs(change) < 1e-4 * step_deg:
+            break
+    return lead
+
+
+def _differences(
+    sweeps: Sequence[_Sweep], azimuth_deg: FloatArray, lead_deg: float
+) -> tuple[FloatArray, FloatArray]:
+    """(angle, gate) difference and mean of the profiles of the two directions, turned back by a lead."""
+    up, down = (_mean_profile(sweeps, way, azimuth_deg + way * lead_deg) for way in (1.0, -1.0))
+    return up - down, (up + down) / 2
+
+
+def _misfit(sweeps: Sequence[_Sweep], weight: FloatArray, azimuth_deg: FloatArray, lead_deg: float) -> float:
+    """Weighted mean square difference of the two profiles."""
+    square = np.square(_differences(sweeps, azimuth_deg, lead_deg)[0])
+    known = np.isfinite(square)
+    return float(np.sum(np.where(known, square, 0.0) * weight) / max(np.sum(known * weight), 1e-12))
+
+
+def _newton_step(
+    sweeps: Sequence[_Sweep], weight: FloatArray, azimuth_deg: FloatArray, lead_deg: float
+) -> float:
+    """Change of the lead [deg]: the difference is twice what is left of the lead times the slope."""
+    difference, mean = _differences(sweeps, azimuth_deg, lead_deg)
+    reach = min(SLOPE_RAYS, (len(azimuth_deg) - 1) // 2)
+    if reach < 1:
+        return 0.0
+    slope = (mean[2 * reach :] - mean[: -2 * reach]) / (azimuth_deg[2 * reach :] - azimuth_deg[: -2 * reach])[
+        :, None
+    ]
+    inner = difference[reach:-reach]
+    known = np.isfinite(slope) & np.isfinite(inner)
+    slope, inner = np.where(known, slope, 0.0), np.where(known, inner, 0.0)
+    square = float(np.sum(weight * np.square(slope)))
+    return 0.0 if square == 0 else -float(np.sum(weight * inner * slope)) / (2 * square)
 
 
 def _mean_profile(sweeps: Sequence[_Sweep], way: float, azimuth_deg: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from reconstruct.covariance import lag_covariance, point_covariance
 from reconstruct.joint import expand
 from reconstruct.prediction import TEN_MINUTE_FIELDS, ScanPrediction, scan_prediction
 from reconstruct.rays import Rays
-from reconstruct.retrieval import condition, gain, rows
+from reconstruct.retrieval import fit, gain, rows
 from reconstruct.spectra import Turbulence
 from reconstruct.ten_minute import Reference, TenMinute
 from reconstruct.thinning import thinned
@@ -119,17 +119,16 @@ def predict_turbulent(
     >>> round(still.speed_std_mps, 3), round(windy.speed_std_mps, 2)
     (0.019, 0.31)
     """
-    matrix = rows(rays.azimuth_deg, rays.elevation_deg)
-    fit = gain(matrix, weights)
-    lidars = wind_covariance_by_source(fit, rays, wind, sources) if sources is not None else {}
+    gains, condition = fit(rows(rays.azimuth_deg, rays.elevation_deg), weights)
+    lidars = wind_covariance_by_source(gains, rays, wind, sources) if sources is not None else {}
     clocks = _clocks(rays, sources)
-    each = [turbulence_covariance(late, wind, turbulence, gains=fit, sweep=sweep) for late in clocks]
+    each = [turbulence_covariance(late, wind, turbulence, gains=gains, sweep=sweep) for late in clocks]
     whole = scan_prediction(
         "turbulent",
         wind,
         covariance_m2s2=sum(lidars.values(), np.mean(each, axis=0)),
-        mean_error_mps=np.sum(list(mean_errors_mps(fit, rays, wind).values()), axis=0),
-        condition=float(condition(matrix, weights)),
+        mean_error_mps=np.sum(list(mean_errors_mps(gains, rays, wind).values()), axis=0),
+        condition=float(condition),
         reasons=dict.fromkeys(TEN_MINUTE_FIELDS, ONE_SCAN),
     )
     if reference == "vector" or whole.speed_bias_mps is None:

@@ -125,7 +125,7 @@ def judge(simulation: Simulation, *, reference: Reference = "scalar") -> Verdict
 
 
 class CampaignVerdict(NamedTuple):
-    """Errors over the states of a climate: mean bias, root-mean-square scatter, and the regression of all periods."""
+    """Errors over the states of a climate: mean bias, root-mean-square scatter, regression of all periods."""
 
     speed_bias_mps: Estimate  # of a scan against the mean of the reference
     speed_std_mps: Estimate
@@ -287,9 +287,12 @@ def _mean_turn(turn: ComplexArray) -> float:
 
 
 def _std_turn(turn: ComplexArray) -> float:
-    """Root mean square of the wrapped errors from their circular mean [degrees]."""
+    """Standard deviation of the wrapped errors from their circular mean [degrees]."""
     known = turn[np.isfinite(turn)]
-    return float(np.degrees(np.sqrt(_mean(np.square(np.angle(known * np.conj(np.sum(known))))))))
+    if known.size < 2:
+        return float("nan")
+    square = np.sum(np.square(np.angle(known * np.conj(np.sum(known)))))
+    return float(np.degrees(np.sqrt(square / (known.size - 1))))
 
 
 def _covariance_of(i: int, j: int) -> Callable[[_Periods], float]:

@@ -25,7 +25,8 @@ def test_house_style_is_checked_by_machine(command):
 
 
 def test_gate_runs_the_test_command_of_the_readme():
-    lines = [line for line in (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines() if line.startswith("python3 -m venv")]
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    lines = [line for line in script.splitlines() if line.startswith("python3 -m venv")]
     assert len(lines) == 1
     assert lines[0] in (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -37,11 +38,17 @@ def test_no_registry_host_or_machine_path_is_committed():
     forbidden = re.compile(r"files\.pythonhosted|//pypi\.org|registry\.npmjs|(?<![\w/.])/(?:root|work)/")
     for name in tracked.stdout.splitlines():
         path = ROOT / name
-        if path.suffix in {".py", ".md", ".toml", ".txt", ".yaml", ".sh", ""} and path.is_file() and path != Path(__file__):
+        if (
+            path.suffix in {".py", ".md", ".toml", ".txt", ".yaml", ".sh", ""}
+            and path.is_file()
+            and path != Path(__file__)
+        ):
             assert not forbidden.search(path.read_text(encoding="utf-8")), name
 
 
 @pytest.mark.parametrize("package", ["geometry", "reconstruct", "planner"])
 def test_every_module_says_what_it_is(package):
     for path in (ROOT / package).rglob("*.py"):
-        assert path.read_text(encoding="utf-8").lstrip().startswith('"""'), f"{path.relative_to(ROOT)} has no docstring"
+        assert path.read_text(encoding="utf-8").lstrip().startswith('"""'), (
+            f"{path.relative_to(ROOT)} has no docstring"
+        )

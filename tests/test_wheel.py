@@ -23,7 +23,19 @@ def test_installed_wheel_plans_outside_the_checkout(tmp_path):
     (packages,) = environment.glob("lib/python*/site-packages")
     dependencies = next(Path(path) for path in sys.path if path.endswith("site-packages"))
     (packages / "dependencies.pth").write_text(f"{dependencies}\n", encoding="utf-8")
-    run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--target", packages, wheel, cwd=tmp_path)
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "-q",
+        "--no-deps",
+        "--no-index",
+        "--target",
+        packages,
+        wheel,
+        cwd=tmp_path,
+    )
     python = environment / "bin" / "python"
     # -P keeps the working folder off the path; the target folder stands before the dependencies' own editable hook
     where = run(python, "-P", "-c", "import planner; print(planner.__file__)", cwd=tmp_path)
@@ -33,5 +45,15 @@ def test_installed_wheel_plans_outside_the_checkout(tmp_path):
     run(python, "-P", "-m", "planner.cli", "new", tmp_path / "campaign", cwd=tmp_path)
     out = run(python, "-P", "-m", "planner.cli", "point", tmp_path / "campaign" / "site.yaml", cwd=tmp_path)
     assert "azimuth" in out.lower()
-    run(python, "-P", "-m", "planner.cli", "report", tmp_path / "campaign" / "site.yaml", "--out", tmp_path / "out", cwd=tmp_path)
+    run(
+        python,
+        "-P",
+        "-m",
+        "planner.cli",
+        "report",
+        tmp_path / "campaign" / "site.yaml",
+        "--out",
+        tmp_path / "out",
+        cwd=tmp_path,
+    )
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000

@@ -1,10 +1,12 @@
 """Set the predicted errors of the Høvsøre sector scans beside the published ones: prints the tables of the
-docs.
+docs, and draws their figure.
 
-Run from the root of the project: python examples/hovsore/compare_published.py
+Run from the root of the project: python examples/hovsore/compare_published.py [docs/hovsore_comparison.png]
 """
 
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -28,6 +30,8 @@ STEP_DEG, RAY_S, PERIOD_S, SCAN_RAYS = 2.0, 0.4, 12.0, 30
 PUBLISHED_SLOPE = {60: 0.998046, 30: 0.985658, 8: 0.863839}
 PUBLISHED_RESIDUAL_MPS = {60: 0.32, 30: 0.55, 8: 0.55}
 PUBLISHED_R2 = {60: 0.9977, 30: 0.9959, 8: 0.9851}
+STATED_SLOPE = {4: 1 / 1.4}  # in words: at 4 degrees the lidar reads 40 % too high
+RESIDUAL_ROUNDING_M2S2 = 0.05  # the published residuals are roots of variances that are rounded to 0.1
 AIR = Turbulence(intensity=0.09, length_m=170.0)
 NOISE_MPS = 0.2
 
@@ -129,22 +133,32 @@ def main() -> None:
             float(direction.residual_std_deg[index]),
         )
         lines.append(_row(cells))
-    lines += [
-        "",
-        _row(["setting", *(f"{size}°" for size in SIZES_DEG)]),
-        _row(["---"] * (len(SIZES_DEG) + 1)),
-    ]
+    heads = ("setting", *(f"{size}°" for size in SIZES_DEG), "RMS of four")
+    lines += ["", _row(heads), _row(["---"] * len(heads))]
     for name, (speed, _) in sensitivities().items():
-        lines.append(_row([name, *(float(slope) for slope in speed.slope)]))
+        lines.append(_row([name, *(float(slope) for slope in speed.slope), misfit(speed)]))
     print("\n".join(lines))  # noqa: T201
+
+
+def misfit(speed: SpeedRegression) -> float:
+    """Root mean square of predicted less published slope, at 60, 30, 8 and 4 degrees."""
+    known = PUBLISHED_SLOPE | STATED_SLOPE
+    off = [float(speed.slope[SIZES_DEG.index(size)]) - slope for size, slope in known.items()]
+    return float(np.sqrt(np.mean(np.square(off))))
+
+
+def settings() -> dict[str, tuple[SpeedRegression, DirectionRegression]]:
+    """The three settings of noise and ray sweep that were weighed."""
+    return {
+        "A: noise 0.2 m/s, ray sweep (as above)": curve(),
+        "B: noise 0.1 m/s, ray sweep": curve(noise_mps=0.1),
+        "C: noise 0.1 m/s, no ray sweep": curve(noise_mps=0.1, sweep=False),
+    }
 
 
 def sensitivities() -> dict[str, tuple[SpeedRegression, DirectionRegression]]:
     """The curve with one setting changed at a time."""
-    return {
-        "as above": curve(),
-        "noise 0.1 m/s": curve(noise_mps=0.1),
-        "noise 0.1 m/s, no ray sweep": curve(noise_mps=0.1, sweep=False),
+    return settings() | {
         "length 150 m": curve(Turbulence(0.09, 150.0)),
         "length 190 m": curve(Turbulence(0.09, 190.0)),
         "intensity 0.08": curve(Turbulence(0.08, 170.0)),
@@ -156,5 +170,61 @@ def sensitivities() -> dict[str, tuple[SpeedRegression, DirectionRegression]]:
     }
 
 
+def draw(path: Path) -> None:
+    """Draw slope and residual scatter against sector size: curves predicted, points published."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2), layout="constrained")
+    looks = (("#0b5394", "-", 2.0), ("#cc6600", "--", 1.4), ("#555555", ":", 1.6))
+    for (name, (speed, _)), (colour, dash, width) in zip(settings().items(), looks, strict=True):
+        look = {
+            "color": colour,
+            "linestyle": dash,
+            "linewidth": width,
+            "label": name.replace(" (as above)", ""),
+        }
+        left.plot(SIZES_DEG, speed.slope, **look)
+        right.plot(SIZES_DEG, speed.residual_std_mps, **look)
+    point = {"color": "black", "linestyle": "none", "zorder": 3}
+    left.plot(*_sides(PUBLISHED_SLOPE), marker="o", label="published", **point)
+    left.plot(*_sides(STATED_SLOPE), marker="o", markerfacecolor="none", label="published in words", **point)
+    sizes, residual = (np.array(side) for side in _sides(PUBLISHED_RESIDUAL_MPS))
+    ends = np.sqrt(residual**2 + RESIDUAL_ROUNDING_M2S2 * np.array([[-1.0], [1.0]]))
+    right.errorbar(
+        sizes,
+        residual,
+        np.abs(ends - residual),
+        fmt="o",
+        capsize=3,
+        label="published, with rounding",
+        **point,
+    )
+    left.set(
+        ylabel="slope of mast = slope · lidar", title="Speed regression through the origin", ylim=(0.65, 1.03)
+    )
+    right.set(
+        ylabel="standard deviation of the residuals [m/s]",
+        title="Scatter of ten-minute means",
+        ylim=(0, 0.85),
+    )
+    for axes in (left, right):
+        axes.set(xscale="log", xlabel="sector [°]", xlim=(3.6, 67))
+        axes.set_xticks(SIZES_DEG, [str(size) for size in SIZES_DEG])
+        axes.minorticks_off()
+        axes.grid(color="#dddddd", linewidth=0.6)
+        axes.legend(frameon=False, fontsize=8)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def _sides(values: dict[int, float]) -> tuple[list[int], list[float]]:
+    return list(values), list(values.values())
+
+
 if __name__ == "__main__":
     main()
+    if len(sys.argv) > 1:
+        draw(Path(sys.argv[1]))

@@ -16,8 +16,10 @@ from planner.commands.options import (
 
 if TYPE_CHECKING:
     from planner.budget import Budget
+    from planner.error_curve import SizesFrom
     from planner.error_nouns import ErrorCurve
     from planner.plan import Plan
+    from reconstruct.prediction import Tier
 
 SizesOption = Annotated[
     str | None,
@@ -48,6 +50,8 @@ BudgetOption = Annotated[
     bool, typer.Option("--budget", help="Add the uncertainty budget of the ten-minute means.")
 ]
 
+TIERS: tuple["Tier", ...] = ("noise", "linear", "turbulent", "monte-carlo")
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
@@ -69,8 +73,8 @@ def errors(
     from planner.commands.load import load_plan
     from planner.commands.progress import shown
 
-    kind = chosen("--sizes-from", sizes_from, ("own", "subset"))
-    by = None if tier is None else chosen("--tier", tier, ("noise", "linear", "turbulent", "monte-carlo"))
+    kind: SizesFrom = chosen("--sizes-from", sizes_from, ("own", "subset"))
+    by: Tier | None = None if tier is None else chosen("--tier", tier, TIERS)
     sizes_deg = None if sizes is None else numbers("--sizes", sizes)
     plan = load_plan(site, fidelity)
     with shown("simulating", quiet=quiet or by != "monte-carlo") as progress:
@@ -85,32 +89,21 @@ def errors(
     for item in plan.budgets if budget else ():
         _print_budget(item)
     remark(
-        "Errors are retrieved less true, over the site's wind; scan: one scan; 10 min: its ten-minute mean against a cup at the target; "
+        "Errors are retrieved less true, over the site's wind; scan: one scan; 10 min: its ten-minute mean against a cup "
+        "at the target; "
         "slope: mast = slope · lidar; – : the tier cannot know it.",
         quiet=quiet,
     )
 
 
 def _document(plan: "Plan", curve: "ErrorCurve", *, budget: bool) -> dict[str, object]:
-    advice = plan.recommendation(curve)
-    parts = [
-        item.entries
-        for item in plan.budgets
-        if budget and (item.scan, item.target) == (curve.scan, curve.target)
-    ]
-    return {
-        "lidar" if curve.lidar else "pair": curve.lidar or curve.scan,
-        "scan": curve.scan,
-        "target": curve.target,
-        "tier": curve.tier,
-        "reference": curve.reference,
-        "recommended_sector_deg": advice.sector_deg,
-        "reason": advice.reason,
-        "saving": advice.saving or None,
-        "states": curve.states,
-        "sizes": [size.as_dict() for size in curve.sizes],
-        **({"budget": [entry._asdict() for entry in parts[0]]} if parts else {}),
-    }
+    from planner.error_entry import error_entry
+
+    entry = dict(error_entry(plan, curve))
+    for item in plan.budgets if budget else ():
+        if (item.scan, item.target) == (curve.scan, curve.target):
+            entry["budget"] = [part._asdict() for part in item.entries]
+    return entry
 
 
 def _print(plan: "Plan", curve: "ErrorCurve") -> None:
@@ -171,7 +164,8 @@ def _print_budget(budget: "Budget") -> None:
         )
         for entry in budget.entries
     ]
-    title = f"Uncertainty of ten-minute means of {budget.scan} → {budget.target}, wind {budget.wind.speed_mps:.1f} m/s from {budget.wind.from_deg:.0f}°"
+    wind = f"wind {budget.wind.speed_mps:.1f} m/s from {budget.wind.from_deg:.0f}°"
+    title = f"Uncertainty of ten-minute means of {budget.scan} → {budget.target}, {wind}"
     columns = (
         "source",
         "speed m/s, k = 1",

@@ -1,6 +1,6 @@
 """`lidarplan report SITE [SITE2]`: all of it on one page, with its tables beside it."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,11 +16,19 @@ from planner.commands.options import (
     say_json,
 )
 
+if TYPE_CHECKING:
+    from planner.plan import Plan
+    from planner.tradeoff import Trade
+
 SecondSite = Annotated[
     str | None,
     typer.Argument(
         metavar="[SITE2]", help="A second site file, to be compared with the first.", show_default=False
     ),
+]
+
+TradeoffOption = Annotated[
+    bool, typer.Option("--tradeoff", help="Also measure what accuracy costs here; takes a minute.")
 ]
 
 
@@ -34,6 +42,7 @@ def report(
     site2: SecondSite = None,
     out: OutOption = DEFAULT_OUT,
     fidelity: FidelityOption = None,
+    tradeoff: TradeoffOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -45,8 +54,19 @@ def report(
     if site == site2 == "-":
         raise InputError("both sites were to come from standard input; give one of them as a file")
     plans = [load_plan(name, fidelity) for name in (site, site2) if name is not None]
-    files = write_report(plans, out, progress=lambda text: remark(text, quiet=quiet))
+    trades = [_measured(plan, quiet=quiet) for plan in plans] if tradeoff else []
+    files = write_report(plans, out, trades=trades, progress=lambda text: remark(text, quiet=quiet))
     if json:
         say_json({"report": str(files[0]), "tables": [str(path) for path in files[1:]]})
     else:
         say(str(files[0]))
+
+
+def _measured(plan: "Plan", *, quiet: bool) -> "tuple[Trade, ...]":
+    """Time and error of every way, as `lidarplan tradeoff` measures them."""
+    from numpy.random import default_rng
+
+    from planner.commands.progress import shown
+
+    with shown(f"{plan.site.name}: measuring", quiet=quiet) as progress:
+        return plan.trades(rng=default_rng(1), progress=progress)

@@ -5,12 +5,29 @@ from typing import Annotated
 
 import typer
 
-from planner.commands.options import FidelityOption, JsonOption, QuietOption, SiteArgument, remark, say, say_json
+from planner.commands.options import (
+    FidelityOption,
+    JsonOption,
+    QuietOption,
+    SiteArgument,
+    remark,
+    say,
+    say_json,
+)
 
 OutFolder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the campaign.")]
 DaysOption = Annotated[float, typer.Option("--days", metavar="D", help="Length of the campaign in days.")]
 SeedOption = Annotated[int, typer.Option("--seed", help="The same seed gives the same campaign.")]
-FormatOption = Annotated[str, typer.Option("--format", metavar="csv|parquet|store", help="Format of the rays.")]
+FormatOption = Annotated[
+    str,
+    typer.Option(
+        "--format", metavar="csv|parquet|store|netcdf|windscanner|database", help="Format of the rays."
+    ),
+]
+UrlOption = Annotated[
+    str | None,
+    typer.Option("--url", help="Of the database, as SQLAlchemy writes it. [default: an SQLite file in DIR]"),
+]
 LostOption = Annotated[
     float, typer.Option("--lost", metavar="SHARE", help="Share of the rays that are noise instead of wind.")
 ]
@@ -31,6 +48,7 @@ def simulate(
     days: DaysOption = 1.0,
     seed: SeedOption = 1,
     kind: FormatOption = "csv",
+    url: UrlOption = None,
     lost: LostOption = 0.003,
     cell_m: CellOption = None,
     fidelity: FidelityOption = None,
@@ -55,7 +73,7 @@ def simulate(
     options = Options(days=days, seed=seed, lost_share=lost, settings=VirtualSettings(spacing_m=cell_m))
     text = Path(site).read_text(encoding="utf-8-sig")
     with shown("flying the campaign", quiet=quiet) as progress:
-        files = write_virtual(plan, text, out, options=options, kind=form, progress=progress)
+        files = write_virtual(plan, text, out, options=options, kind=form, url=url, progress=progress)
     if json:
         say_json({"campaign": str(files[0]), "files": [str(path) for path in files[1:]]})
     else:

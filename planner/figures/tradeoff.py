@@ -18,7 +18,7 @@ SMALLEST = 1e-9  # an error below it is drawn there: a logarithm has no 0
 def tradeoff_figure(trades: Sequence[Trade]) -> bytes:
     """Draw time (across) against error (up) of every method as a PNG; the reference of each panel stands at the bottom."""
     topics = [topic for topic in TOPICS if any(trade.topic == topic for trade in trades)]
-    with canvas(10.0, 4.2 * ((len(topics) + 1) // 2)) as figure:
+    with canvas(11.5, 4.2 * ((len(topics) + 1) // 2)) as figure:
         for number, topic in enumerate(topics):
             axes = figure.add_subplot((len(topics) + 1) // 2, 2, number + 1)
             rows = [trade for trade in trades if trade.topic == topic]
@@ -36,7 +36,7 @@ def tradeoff_figure(trades: Sequence[Trade]) -> bytes:
                     linestyle="none",
                 )
                 axes.annotate(
-                    trade.method + (" (reference)" if trade.error is None else ""),
+                    trade.method + (" (star: reference)" if trade.error is None else ""),
                     (trade.time_s, height),
                     xytext=(8, 6 if index % 2 == 0 else -10),
                     textcoords="offset points",
@@ -57,7 +57,7 @@ def tradeoff_figure(trades: Sequence[Trade]) -> bytes:
                 )
             axes.set_xscale("log")
             axes.set_yscale("log")
-            axes.margins(x=0.35, y=0.2)
+            axes.margins(x=0.45, y=0.2)
             axes.set_xlabel("time [s]")
             axes.set_ylabel(f"distance from the reference [{rows[0].unit}]")
             axes.set_title(TITLES[topic], fontsize=10.5)

@@ -80,8 +80,9 @@ def _validated(raw: dict[str, object]) -> tuple[Campaign | None, list[Fault]]:
     try:
         return Campaign.model_validate(raw), []
     except ValidationError as error:
-        found = error.errors(include_url=False)
-        return None, [fault_of(details, raw, root=Campaign) for details in found if not is_echo(details)]
+        found = [details for details in error.errors(include_url=False) if not is_echo(details)]
+        faults = [fault_of(details, raw, root=Campaign) for details in found]
+        return None, [fault._replace(allowed=fault.allowed.removeprefix("Value error, ")) for fault in faults]
 
 
 def _site(raw: Mapping[str, object], folder: Path) -> tuple[Site | None, list[Fault]]:

@@ -131,7 +131,7 @@ def _report(name: str, found: list[YamlFault]) -> str:
 
 
 def _named_files(raw: Mapping[str, object]) -> Iterator[tuple[Loc, str]]:
-    for key, field in (("wind", "rose"), ("terrain", "file")):
+    for key, field in (("wind", "rose"), ("terrain", "file"), ("terrain", "surface")):
         part = raw.get(key)
         if isinstance(part, Mapping) and isinstance(name := part.get(field), str):
             yield (key, field), name
@@ -162,7 +162,9 @@ def _rooted(site: Site, folder: Path) -> Site:
     if site.wind and site.wind.rose:
         update["wind"] = site.wind.model_copy(update={"rose": folder / site.wind.rose})
     if site.terrain:
-        update["terrain"] = site.terrain.model_copy(update={"file": folder / site.terrain.file})
+        surface = None if site.terrain.surface is None else folder / site.terrain.surface
+        rooted = {"file": folder / site.terrain.file, "surface": surface}
+        update["terrain"] = site.terrain.model_copy(update=rooted)
     if site.areas.allowed or site.areas.forbidden:
         allowed, forbidden = (
             tuple(area(item) for item in items) for items in (site.areas.allowed, site.areas.forbidden)

@@ -30,6 +30,8 @@ RETRIES = 5
 # How often what is done is written, in batches.
 SAVE_EVERY = 8
 
+CONNECT_S = 10.0  # how long a scheduler has to answer
+
 _shared: Any = None  # in a worker process: what all batches share
 
 
@@ -144,7 +146,7 @@ def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> 
             "--scheduler needs dask, which is not installed: pip install 'lidarplan[cluster]'"
         ) from None
     try:
-        client = Client(address, timeout="10s", set_as_default=False)
+        client = Client(address, timeout=CONNECT_S)
     except (OSError, ValueError) as error:
         raise UnavailableError(
             f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler` and give its tcp:// address"

@@ -21,7 +21,7 @@ HINTS = {
 }
 
 
-def refusal(task: Task, seen: Look, fixed: Sequence[Look]) -> str:
+def refusal(task: Task, seen: Look, fixed: Sequence[BoolArray]) -> str:
     """Why no set of the candidates is allowed, in words.
 
     Parameters
@@ -31,7 +31,7 @@ def refusal(task: Task, seen: Look, fixed: Sequence[Look]) -> str:
     seen
         The criteria of every candidate.
     fixed
-        Of every lidar that stands.
+        (target, 1) of every lidar that stands: what it can measure.
     """
     blind = _blind_fixed(task, fixed)
     if blind:
@@ -48,17 +48,15 @@ def refusal(task: Task, seen: Look, fixed: Sequence[Look]) -> str:
     return "; ".join(lines)
 
 
-def _blind_fixed(task: Task, fixed: Sequence[Look]) -> str:
+def _blind_fixed(task: Task, fixed: Sequence[BoolArray]) -> str:
     """Lidars that stand and see no target from there; empty where all see one."""
-    for lidar, one in zip(task.fixed, fixed, strict=True):
-        if not one.allowed.any():
-            worst = {name: float(values.max()) for name, values in one.slack.items() if not (values >= 0).any()}
-            said = ", ".join(f"{_meaning(name)} by {_amount(name, -value)}" for name, value in worst.items())
-            return (
-                f"{lidar.name}, which stands, can measure none of the targets: it breaks {said or 'a constraint at each'}; "
-                "move it, or leave it out (--lidar)"
-            )
-    return ""
+    blind = [lidar.name for lidar, seen in zip(task.fixed, fixed, strict=True) if not seen.any()]
+    if not blind:
+        return ""
+    return (
+        f"{', '.join(blind)}, which stands, can measure none of the targets: they are out of its range or behind the "
+        "terrain; move it, or leave it out (--lidar)"
+    )
 
 
 def _no_crossing(task: Task, count: int) -> str:

@@ -18,12 +18,13 @@ from geometry.wake_bins import BINS, WakeModel, disturbed_bins
 from planner.exclusion import wanted_directions
 from planner.obstruction import margin_m
 from planner.placement.areas import allowed_bounds_m, area_slack_m
+from planner.placement.echo import echo
 from planner.placement.task import Task
 from planner.site import Lidar, Site
+from planner.wind_climate import error_sources
 from planner.wind_rose import share_within
 from reconstruct.beam_table import BeamTable, beam_table
 from reconstruct.sector_map import sector_variance
-from reconstruct.uncertainty import ErrorSources
 
 GRID = 100  # candidates along each side
 REACH_SHARE = 1.5  # of the farthest declared lidar's distance: half the side of the default grid
@@ -41,7 +42,8 @@ CRITERIA: Mapping[str, tuple[str, str]] = {
     "elevation-max": ("deg", "the steepest elevation"),
     "sight": ("m", "rotors, towers, masts and obstacles in the way"),
     "terrain": ("m", "the terrain in the way"),
-    "wakes": ("share", "wind lost to wakes"),
+    "signal": ("share", "rays lost to a weak echo"),
+    "wakes": ("share", "wind lost to wakes, beyond what the target itself loses"),
     "opening": ("deg", "the opening angle"),
 }
 """Unit and meaning of every criterion."""
@@ -89,11 +91,11 @@ class Look:
         return np.logical_and.reduce([values >= 0.0 for values in self.slack.values()])
 
 
-def default_grid(task: Task, *, count: int = GRID) -> Grid:
+def default_grid(task: Task, *, count: int = GRID, reach_m: float | None = None) -> Grid:
     """A grid over the allowed ground, else over a square around the targets.
 
     Half its side is 1.5 times the distance to the farthest declared lidar of the task, 3 km where there is none, and no
-    more than the farthest range.
+    more than the farthest range; `reach_m` wins over all that.
     """
     bounds = allowed_bounds_m(task.site)
     if bounds is None:
@@ -101,7 +103,7 @@ def default_grid(task: Task, *, count: int = GRID) -> Grid:
         declared = np.array([lidar.position[:2] for lidar in (*task.fixed, *task.replaced)]).reshape(-1, 2)
         away = np.hypot(*(declared[:, None] - task.targets_m[:, :2]).reshape(-1, 2).T)
         reach = REACH_SHARE * float(away.max()) if away.size else DEFAULT_REACH_M
-        reach = min(reach, task.limits.most_range_m)
+        reach = min(reach, task.limits.most_range_m) if reach_m is None else reach_m
         bounds = (*(low - reach), *(high + reach))
     west, south, east, north = bounds
     return Grid(np.linspace(west, east, count), np.linspace(north, south, count))
@@ -133,28 +135,31 @@ def look(task: Task, positions_m: FloatArray) -> Look:
         "elevation-max": limits.most_elevation_deg - beam.elevation_deg,
         "sight": _sight_slack_m(task, local, beam.range_m),
         "terrain": _terrain_slack_m(task, positions_m),
-        "wakes": limits.most_lost_share - lost,
+        "signal": echo(task.pattern, task.scan, beam.range_m).valid_share - limits.least_valid_share,
+        "wakes": limits.most_lost_share - (lost - _lost_at_targets(task)[:, None]),
     }
     slack = {name: np.where(known, values, np.nan) for name, values in slack.items()}
     return Look(positions_m, local, beam.range_m, beam.azimuth_deg, beam.elevation_deg, lost, slack)
 
 
-def table_of(task: Task, seen: Look, *, sources: ErrorSources | None = None) -> BeamTable:
-    """What beams from the places looked at contribute to the error."""
+def table_of(task: Task, seen: Look, *, lidar: Lidar | None = None) -> BeamTable:
+    """What beams from the places looked at contribute to the error: of the lidar that is placed, or of another."""
+    lidar = lidar or task.pattern
     return beam_table(
         seen.local_m,
         task.local_targets_m,
         task.climates,
         task.states,
-        sources or task.sources,
+        error_sources(lidar, lidar.radial_speed_noise_mps),
         criterion=task.criterion,
-        ground_m=task.ground_m,
         seen=seen.allowed,
+        noise_mps=echo(lidar, task.scan_of(lidar), seen.range_m).noise_mps,
     )
 
 
 def single_variance(task: Task, seen: Look) -> FloatArray:
     """(target, place) variance of the wind from the sector scan of a lidar there, in the criterion's unit."""
+    strong = echo(task.pattern, task.scan, seen.range_m)
     out = [
         sector_variance(
             seen.local_m,
@@ -164,8 +169,7 @@ def single_variance(task: Task, seen: Look) -> FloatArray:
             state,
             task.sources,
             criterion=task.criterion,
-            ground_m=task.ground_m,
-        )
+            )
         for target, climate, state in zip(task.local_targets_m, task.climates, task.states, strict=True)
     ]
     return np.where(seen.allowed, np.stack(out), np.inf)
@@ -278,17 +282,27 @@ def _lost_share(
         return np.zeros(azimuth_deg.shape)
     if task.single:
         return np.stack([_lost_to_arcs(task, local, *beam) for beam in zip(azimuth_deg, elevation_deg, range_m, strict=True)])
-    beams = zip(task.local_targets_m, azimuth_deg, elevation_deg, strict=True)
-    return np.stack([_lost_to_probes(task, *beam) for beam in beams])
+    ways = _lost_by_way(task)
+    which = np.round(azimuth_deg / PROBE_STEP_DEG).astype(np.intp) % ways.shape[1]
+    return np.asarray(np.take_along_axis(ways, which, axis=1))
 
 
-def _lost_to_probes(task: Task, target: FloatArray, azimuth_deg: FloatArray, elevation_deg: FloatArray) -> FloatArray:
-    """(place,) share lost by the probe of a beam at a target: the same for beams that look the same way to two degrees."""
-    rounded = np.stack([azimuth_deg, elevation_deg], axis=-1) / PROBE_STEP_DEG
-    ways, which = np.unique(np.round(rounded).astype(int), axis=0, return_inverse=True)
+@lru_cache(maxsize=4)
+def _lost_at_targets(task: Task) -> FloatArray:
+    """(target,) share lost at the target itself, whoever looks at it."""
+    if not task.site.turbines:
+        return np.zeros(len(task.targets))
+    return np.asarray(_touched(task, task.local_targets_m[:, None]) @ _direction_weight(task.site))
+
+
+@lru_cache(maxsize=4)
+def _lost_by_way(task: Task) -> FloatArray:
+    """(target, way) share lost by the probe of a beam that looks at a target from one of the ways round, taken as level."""
+    azimuth = np.arange(0.0, 360.0, PROBE_STEP_DEG)
     half = task.probe.length_m / 2 * np.array([-1.0, 0.0, 1.0])
-    samples = target + point_at(*(PROBE_STEP_DEG * ways.T[..., None]), half)
-    return np.asarray((_touched(task, samples) @ _direction_weight(task.site))[which.ravel()])
+    samples = task.local_targets_m[:, None, None] + point_at(azimuth[:, None], 0.0, half)
+    weight = _direction_weight(task.site)
+    return np.stack([_touched(task, of_target) @ weight for of_target in samples])
 
 
 def _lost_to_arcs(

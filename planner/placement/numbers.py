@@ -7,14 +7,15 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.beams import beam_to
+from planner.placement.echo import echo
 from planner.placement.maps import Look
 from planner.placement.task import Aggregate, Task
 from planner.site import Lidar
 from planner.wind_climate import error_sources
 from reconstruct.beam_table import Criterion, condensed
-from reconstruct.prediction import predict_linear
 from reconstruct.rays import Rays
-from reconstruct.uncertainty import ErrorSources
+from reconstruct.retrieval import gain, rows
+from reconstruct.uncertainty import ErrorSources, wind_covariance_by_source
 from reconstruct.wind import WindState
 
 
@@ -49,12 +50,17 @@ def numbers_of(task: Task, looks: Sequence[Look]) -> Numbers:
     Returns
     -------
     Numbers
-        Errors by `predict_linear`, the retrieval core, at every target and state of its climate.
+        Errors by the linear tier through the retrieval core, at every target and state of its climate.
     """
     lidars = [*task.fixed, *[task.pattern] * (len(looks) - len(task.fixed))]
-    sources = [error_sources(lidar, lidar.radial_speed_noise_mps) for lidar in lidars]
+    noise = [
+        echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[:, 0] for lidar, each in zip(lidars, looks, strict=True)
+    ]
     heads = np.concatenate([each.local_m for each in looks])
-    errors = [_errors(task, number, heads, sources) for number in range(len(task.targets))]
+    errors = [
+        _errors(task, number, heads, [error_sources(*pair) for pair in zip(lidars, of_target, strict=True)])
+        for number, of_target in enumerate(np.transpose(noise).tolist())
+    ]
     azimuth = np.concatenate([each.azimuth_deg for each in looks], axis=1)
     return Numbers(
         speed_std_mps=np.array([speed for speed, _, _ in errors]),
@@ -93,17 +99,20 @@ def _errors(
 ) -> tuple[float, float, float]:
     """Standard deviation of speed [m/s], direction [deg] and vector [m/s] at one target over its climate."""
     rays, climate, like = rays_at(task, number, heads_m), task.climates[number], task.states[number]
+    fit = gain(rows(rays.azimuth_deg, rays.elevation_deg))
     squares = condensed(climate, like, "speed")
-    parts = np.array([_along_across(rays, state, sources) for state in squares.states(like)])
+    parts = np.array([_along_across(fit, rays, state, sources) for state in squares.states(like)])
     speed, side = squares.mean(parts[:, 0]), squares.mean(parts[:, 1])
     inverse = condensed(climate, like, "direction")
-    turned = [_along_across(rays, state, sources)[1] / state.speed_mps**2 for state in inverse.states(like)]
+    turned = [_along_across(fit, rays, state, sources)[1] / state.speed_mps**2 for state in inverse.states(like)]
     return float(np.sqrt(speed)), float(np.degrees(np.sqrt(inverse.mean(turned)))), float(np.sqrt(speed + side))
 
 
-def _along_across(rays: Rays, state: WindState, sources: list[ErrorSources]) -> tuple[float, float]:
-    """Variance of the retrieved wind along and across the wind [m²/s²]."""
-    covariance = predict_linear(rays, state, sources).covariance_m2s2
+def _along_across(
+    fit: FloatArray, rays: Rays, state: WindState, sources: list[ErrorSources]
+) -> tuple[float, float]:
+    """Variance of the retrieved wind along and across the wind [m²/s²]: the linear tier, without its moments."""
+    covariance = np.sum(list(wind_covariance_by_source(fit, rays, state, sources).values()), axis=0)
     along = np.array(state.uv_mps) / state.speed_mps
     across = np.array([-along[1], along[0]])
     return float(along @ covariance @ along), float(across @ covariance @ across)

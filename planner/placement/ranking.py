@@ -1,7 +1,7 @@
 """From a task to ranked places: the grid, the search, the refinement, the numbers that are shown, and why."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +11,22 @@ from geometry.errors import InputError
 from planner.placement import search
 from planner.placement.fan_out import How
 from planner.placement.infeasible import refusal
-from planner.placement.maps import CRITERIA, Grid, Look, check_terrain, look, of_lidar, single_variance, standing_m, table_of
+from planner.placement.maps import (
+    CRITERIA,
+    Grid,
+    Look,
+    check_terrain,
+    look,
+    of_lidar,
+    standing_m,
+    table_of,
+)
 from planner.placement.numbers import Numbers, numbers_of
 from planner.placement.refine import WORTH, Improve, SoftCost, binding, refined
 from planner.placement.task import Task
-from planner.wind_climate import error_sources
 from reconstruct.beam_table import BeamTable
 
+PHYSICAL = ("range-min", "range-max", "terrain")
 APART_CELLS = 4.0  # two places this many cells of the grid apart are different ones
 WHAT = {"vector": "wind vector", "speed": "wind speed", "direction": "wind direction"}
 MOST = 5  # distinct optima
@@ -80,7 +89,7 @@ def place(task: Task, grid: Grid, *, how: How | None = None, cost: SoftCost | No
     improve = Improve(task, fixed_tables(task), grid.spacing_m, cost or _free)
     error, sets = _searched(improve, seen, how, most)
     if not len(sets.members):
-        raise InputError(refusal(task, seen, [of_lidar(task, lidar) for lidar in task.fixed]))
+        raise InputError(refusal(task, seen, [table.seen for table in improve.fixed]))
     found = [refined(improve, seen.positions_m[members, :2]) for members in sets.members]
     apart = _apart(found, APART_CELLS / 2 * grid.spacing_m)
     ranked = tuple(_ranked(improve, *one, rank=rank) for rank, one in enumerate(apart, start=1))
@@ -89,11 +98,27 @@ def place(task: Task, grid: Grid, *, how: How | None = None, cost: SoftCost | No
 
 
 def fixed_tables(task: Task) -> list[BeamTable]:
-    """What the lidars that stand contribute, one candidate each."""
-    return [
-        table_of(task, of_lidar(task, lidar), sources=error_sources(lidar, lidar.radial_speed_noise_mps))
-        for lidar in task.fixed
-    ]
+    """What the lidars that stand contribute, one candidate each.
+
+    They are where they are: of the constraints only those count for them that leave no signal at all.
+    """
+    out = []
+    for lidar in task.fixed:
+        seen = of_lidar(task, lidar)
+        physical = replace(seen, slack={name: seen.slack[name] for name in PHYSICAL})
+        out.append(table_of(task, physical, lidar=lidar))
+    return out
+
+
+def standing_remarks(task: Task) -> tuple[str, ...]:
+    """What the lidars that stand break, in words."""
+    remarks = []
+    for lidar in task.fixed:
+        for name, slack in of_lidar(task, lidar).slack.items():
+            out = [target for target, values in zip(task.targets, slack, strict=True) if not values[0] >= 0.0]
+            if out:
+                remarks.append(f"{lidar.name}, which stands, breaks at {', '.join(out)}: {CRITERIA[name][1]}")
+    return tuple(remarks)
 
 
 def _free(places_m: FloatArray) -> FloatArray:
@@ -171,10 +196,10 @@ def _declared(improve: Improve) -> Ranked | None:
     positions = np.array([lidar.position for lidar in task.replaced], dtype=np.float64)
     broken = [name for one in looks for name, slack in one.slack.items() if not (slack >= 0.0).all()]
     value = numbers.value(task.criterion, task.aggregate) + float(improve.cost(positions[:, :2]).sum())
-    return Ranked(0, positions, value, numbers, tuple(dict.fromkeys(broken)), _line(task, positions, numbers, ()))
+    return Ranked(0, positions, value, numbers, tuple(dict.fromkeys(broken)), _line(task, positions, numbers, None))
 
 
-def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str, ...]) -> str:
+def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str, ...] | None) -> str:
     """What one set is, in a line."""
     spots = " and ".join(f"E {east:.0f} N {north:.0f}" for east, north, _ in positions)
     worst = int(np.argmax(numbers.speed_std_mps))
@@ -186,6 +211,8 @@ def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str,
     placed = slice(len(task.fixed), None)
     parts.append(f"range {_span(numbers.range_m[:, placed], ' m')}")
     parts.append(f"elevation {_span(numbers.elevation_deg[:, placed], '°', 1)}")
+    if binds is None:
+        return ", ".join(parts)
     parts.append("bound by " + (", ".join(CRITERIA[name][1] for name in binds) if binds else "nothing: the error is least here"))
     return ", ".join(parts)
 

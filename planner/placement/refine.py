@@ -18,8 +18,9 @@ LEVELS = 3  # of ever finer grids around each place
 FINER = 4.0
 AROUND = np.stack(np.meshgrid(np.arange(-3, 4), np.arange(-3, 4)), axis=-1).reshape(-1, 2) / 3.0
 SWEEPS = 2  # through the lidars of a set on each level
-POLISH_STEPS = 40  # of Nelder and Mead's simplex, for each coordinate
+POLISH_STEPS = 20  # of Nelder and Mead's simplex, for each coordinate
 WORTH = 1e-4  # a place is better if its error is smaller by this share
+TOUCHED = {"m": 1.0, "deg": 0.05, "share": 0.002}  # less than this is left over: the constraint is met with nothing to spare
 LOOK_AROUND = 16  # directions in which the constraint that binds is sought
 
 
@@ -143,6 +144,10 @@ def binding(improve: Improve, places_m: FloatArray, value: float) -> tuple[str, 
             most = float(np.max(better[out], initial=0.0))
             if most > WORTH:
                 gain[name] = max(gain.get(name, 0.0), most)
+    here = look(improve.task, standing_m(improve.task, places_m))
+    for name, values in here.slack.items():
+        if float(np.nanmin(values)) < TOUCHED[CRITERIA[name][0]]:
+            gain.setdefault(name, 0.0)
     return tuple(sorted(gain, key=lambda name: (-gain[name], list(CRITERIA).index(name))))
 
 

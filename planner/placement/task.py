@@ -31,8 +31,11 @@ LEAST_OPENING_DEG = 30.0
 # The steepest beam for a horizontal wind: at 30 degrees a vertical wind enters with tan 30° = 0.58 of itself.
 STEEPEST_DEG = 30.0
 
-# The share of the wanted wind that wakes may take from one target.
+# The share of the wanted wind that wakes may take from what is measured beyond what they take from the target itself.
 MOST_LOST_SHARE = 0.25
+
+# Rays of which so few are valid make few complete scans.
+LEAST_VALID_SHARE = 0.8
 
 # Where a lidar's own height above the ground is not known or not above it.
 HEAD_HEIGHT_M = 2.0
@@ -49,7 +52,8 @@ class Limits(NamedTuple):
     least_elevation_deg: float = -10.0
     most_elevation_deg: float = STEEPEST_DEG
     least_opening_deg: float = LEAST_OPENING_DEG  # of the two beams of a set that cross best, in plan
-    most_lost_share: float = MOST_LOST_SHARE  # of the wanted wind, to wakes, at any target
+    most_lost_share: float = MOST_LOST_SHARE  # of the wanted wind, to wakes, beyond the target's own
+    least_valid_share: float = LEAST_VALID_SHARE  # of rays whose echo is strong enough, where `signal` is declared
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +111,6 @@ class Task:
         return self.places.local_m(self.targets_m)
 
     @cached_property
-    def ground_m(self) -> float:
-        """Height of the ground in the local frame [m]."""
-        return 0.0  # the origin of `Places` lies on the ground
-
-    @cached_property
     def climates(self) -> tuple[Climate, ...]:
         """The wind at each target: declared directions, else those free of wakes at the target itself."""
         return tuple(climate_at(self.site, name, self._excluded(number)) for number, name in enumerate(self.targets))
@@ -134,6 +133,12 @@ class Task:
     def sources(self) -> ErrorSources:
         """What can be wrong with a lidar that is placed."""
         return error_sources(self.pattern, self.pattern.radial_speed_noise_mps)
+
+    def scan_of(self, lidar: Lidar) -> ScanPlan | None:
+        """The scan of a lidar: of the pattern the task's, of another the first that the site declares."""
+        if lidar is self.pattern:
+            return self.scan
+        return next((scan for scan in self.site.scans if scan.lidar == lidar.name), None)
 
     @cached_property
     def probe(self) -> Probe:

@@ -164,7 +164,9 @@ def _columns(points_m: FloatArray) -> dict[str, list[float]]:
 
 
 def _hover(text: str) -> dict[str, Any]:
-    return {"hoverinfo": "text", "hovertext": html.escape(text, quote=False)} if text else {"hoverinfo": "skip"}
+    return (
+        {"hoverinfo": "text", "hovertext": html.escape(text, quote=False)} if text else {"hoverinfo": "skip"}
+    )
 
 
 def _mesh(layer: Layer, mesh: Mesh) -> dict[str, Any]:

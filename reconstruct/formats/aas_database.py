@@ -1,35 +1,37 @@
-"""Rays from and to the reference study's database: SQLite files, MariaDB and MySQL."""
+"""Rays from the reference study's database: SQLite files, MariaDB and MySQL."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
-from reconstruct.formats.aas_tables import METRES_IN_DECAMETRE, connected, create_tables, held_columns, select
+from reconstruct.formats.aas_tables import (
+    CHUNK_ROWS,
+    METRES_IN_DECAMETRE,
+    connected,
+    held_columns,
+    scenario_numbers,
+    select,
+)
 from reconstruct.formats.gate_table import gate_table
 from reconstruct.formats.options import Options
 from reconstruct.formats.over_the_top import folded
-from reconstruct.formats.text import labview_from_utc, seconds_delta, utc_from_labview
+from reconstruct.formats.text import seconds_delta, utc_from_labview
 from reconstruct.losses import Loss
 from reconstruct.records import Records, join
 from reconstruct.sweep_ids import sweep_ids
-from reconstruct.sweep_lag import estimate_lead, without_lead
+from reconstruct.sweep_lag import estimate_lead, evened, without_lead
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-ScanType = Literal["LOS", "PPI", "RHI", "DBS", "CTC", "CTD"]
-
 #: Rays that are fetched at once: with 41 gates some 800,000 rows.
 CHUNK_RAYS = 20_000
-
-#: Rows that are sent at once.
-CHUNK_ROWS = 50_000
 
 _NOTES = (
     "radial speeds turned from negative away to positive away",
@@ -63,12 +65,13 @@ def read_aas(place: str | Path, options: Options | None = None) -> Records:
         )
     records = join(parts)
     if options.azimuth == "estimate":
-        lead = estimate_lead(records)
+        even, _ = evened(records)
+        lead = estimate_lead(even)
         note = (
             f"azimuths turned back by {lead.lead_deg:.2f} +- {lead.std_deg:.2f} deg, the lead that up- "
             "against down-sweeps show"
         )
-        records = replace(without_lead(records, lead.lead_deg), notes=(*records.notes, note))
+        records = replace(without_lead(even, lead.lead_deg), notes=(*records.notes, note))
     return records
 
 
@@ -95,67 +98,9 @@ def aas_chunks(
             options.instrument
             or str(connection.engine.url.database or "").rpartition("/")[2].partition(".")[0]
         )
-        for scenario in _scenarios(connection, held, options.scenario):
+        for scenario in scenario_numbers(connection, held, options.scenario):
             attitude = _attitude(connection, held, scenario)
             yield from _whole_sweeps(_fetched(connection, held, scenario, rays, options, attitude, name))
-
-
-def write_aas(
-    records: Records,
-    place: str | Path,
-    *,
-    scan_type: ScanType = "PPI",
-    pulse_ns: float = 200.0,
-    fft_points: int = 64,
-    position: tuple[float, float, float] | None = None,
-) -> None:
-    """Append records to a database as one scenario for each of their scan ids; all of them or none.
-
-    Parameters
-    ----------
-    records : Records
-    place : str or Path
-        SQLAlchemy's URL, or an SQLite file, which is made where it is not there.
-    scan_type, pulse_ns, fft_points
-        What `scenario` says.
-    position : (float, float, float), optional
-        Latitude, longitude [degrees] and altitude [m] for `system`.
-
-    Raises
-    ------
-    InputError
-        If a scenario of that number is there already.
-    """
-    if not records.rays:
-        return
-    with connected(place, write=True) as connection:
-        create_tables(connection)
-        start = _next_gateway(connection)
-        taken = set(_scenarios(connection, held_columns(connection), None)) & set(
-            np.unique(records.scan_id).tolist()
-        )
-        if taken:
-            raise InputError(
-                f"the database already holds scenario {min(taken)}: give the records another scan_id"
-            )
-        gateway = np.arange(start, start + records.rays)
-        _write_rays(connection, records, gateway, position)
-        _write_scenarios(connection, records, gateway, scan_type, pulse_ns, fft_points)
-
-
-def _scenarios(connection: "sa.Connection", held: dict[str, dict[str, str]], wanted: int | None) -> list[int]:
-    """Numbers of the scenarios that have rays."""
-    if wanted is not None:
-        return [wanted]
-    clause, _ = select("control", held["control"])
-    import sqlalchemy as sa
-
-    column = clause.c[held["control"]["scn_id"]]
-    return [
-        int(row[0])
-        for row in connection.execute(sa.select(column).distinct().order_by(column))
-        if row[0] is not None
-    ]
 
 
 def _attitude(
@@ -282,119 +227,3 @@ def _whole_sweeps(parts: Iterator[Records]) -> Iterator[Records]:
 def _end_to_end(first: Records, second: Records) -> Records:
     """Two parts as one, without looking at their sweeps."""
     return join([replace(part, sweep_id=np.zeros(part.rays, dtype=np.intp)) for part in (first, second)])
-
-
-def _next_gateway(connection: "sa.Connection") -> int:
-    import sqlalchemy as sa
-
-    clause, _ = select("control", {"gw_id": "gw_id"})
-    highest = connection.execute(sa.select(sa.func.max(clause.c.gw_id))).scalar()
-    return 1 if highest is None else int(highest) + 1
-
-
-def _write_rays(
-    connection: "sa.Connection",
-    records: Records,
-    gateway: "np.ndarray[tuple[int], np.dtype[np.int64]]",
-    position: tuple[float, float, float] | None,
-) -> None:
-    """Rows of control, measurement and system."""
-    duration = np.nan_to_num(records.duration_s)
-    middle = labview_from_utc(records.time_utc)
-    start, stop = middle - duration / 2, middle + duration / 2
-    gates = np.full(records.rays, records.gates)
-    columns: list[Any] = [
-        records.scan_id,
-        gateway,
-        start,
-        stop,
-        records.azimuth_deg,
-        records.elevation_deg,
-        gates,
-        duration * 1e3,
-    ]
-    _send(
-        connection,
-        "control",
-        ("scn_id", "gw_id", "dt_start", "dt_stop", "azim", "elev", "nbRG", "acc"),
-        columns,
-    )
-    if position or records.heading_deg is not None:
-        blank = np.full(records.rays, np.nan)
-        where = [np.full(records.rays, value) for value in position or (np.nan,) * 3]
-        logs = [blank if a is None else a for a in (records.heading_deg, records.pitch_deg, records.roll_deg)]
-        _send(
-            connection,
-            "system",
-            ("scn_id", "dt", "lati", "longi", "alti", "head", "pitch", "roll"),
-            [records.scan_id, stop, *where, *logs],
-        )
-    decametres = np.round(records.range_m / METRES_IN_DECAMETRE, 7)
-    step = max(CHUNK_ROWS * 10 // max(records.gates, 1), 1)
-    for first in range(0, records.rays, step):
-        part = slice(first, first + step)
-        count = len(gateway[part])
-        width = records.spectral_width_mps
-        grids = [
-            -records.radial_speed_mps[part],
-            records.cnr_db[part],
-            np.full((count, records.gates), np.nan) if width is None else width[part],
-        ]
-        rows = [
-            np.repeat(gateway[part], records.gates),
-            np.tile(decametres, count),
-            *(grid.ravel() for grid in grids),
-        ]
-        _send(connection, "measurement", ("gw_id", "dist", "radSpeed", "cnr", "disp"), rows)
-
-
-def _write_scenarios(
-    connection: "sa.Connection",
-    records: Records,
-    gateway: "np.ndarray[tuple[int], np.dtype[np.int64]]",
-    scan_type: ScanType,
-    pulse_ns: float,
-    fft_points: int,
-) -> None:
-    seconds = labview_from_utc(records.time_utc)
-    half = np.nan_to_num(records.duration_s) / 2
-    for scenario in np.unique(records.scan_id):
-        rays = records.scan_id == scenario
-        row = [
-            scenario,
-            scan_type,
-            (seconds - half)[rays].min(),
-            (seconds + half)[rays].max(),
-            gateway[rays].min(),
-            gateway[rays].max(),
-        ]
-        names = ("scn_id", "scn_type", "dt_start", "dt_stop", "gw_start_id", "gw_stop_id", "pulse", "fft")
-        _send(connection, "scenario", names, [[value] for value in (*row, pulse_ns, fft_points)])
-
-
-def _send(
-    connection: "sa.Connection",
-    table: str,
-    names: Sequence[str],
-    columns: Sequence[Any],
-) -> None:
-    """Insert columns as rows, with the driver's own bulk insert; NaN becomes NULL."""
-    mark = "?" if connection.dialect.paramstyle == "qmark" else "%s"
-    quote = connection.dialect.identifier_preparer.quote_identifier
-    text = (
-        f"INSERT INTO {quote(table)} ({', '.join(map(quote, names))}) VALUES "
-        f"({', '.join([mark] * len(names))})"
-    )
-    rows = [tuple(row) for row in zip(*(_plain(column) for column in columns), strict=True)]
-    for first in range(0, len(rows), CHUNK_ROWS):
-        connection.exec_driver_sql(text, rows[first : first + CHUNK_ROWS])
-
-
-def _plain(column: Sequence[object] | FloatArray) -> list[object]:
-    """Python's own numbers, None for NaN."""
-    values = np.asarray(column)
-    if values.dtype.kind != "f":
-        return list(values.tolist())
-    out = values.astype(object)
-    out[~np.isfinite(values)] = None
-    return list(out)

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 METRES_IN_DECAMETRE = 10.0
 
+#: Rows that are fetched or sent at once.
+CHUNK_ROWS = 50_000
+
 #: Columns of the tables; `!` marks those that a reader cannot do without.
 COLUMNS = {
     "scenario": ("!scn_id", "scn_type", "dt_start", "dt_stop", "gw_start_id", "gw_stop_id", "pulse", "fft"),
@@ -137,3 +140,20 @@ def _type(name: str) -> "sa.types.TypeEngine[Any]":
     if name == "scn_type":
         return sa.String(8)
     return sa.BigInteger() if name in _INTEGERS else sa.Double()
+
+
+def scenario_numbers(
+    connection: "sa.Connection", held: dict[str, dict[str, str]], wanted: int | None
+) -> list[int]:
+    """Numbers of the scenarios that have rays, or the one that is wanted."""
+    import sqlalchemy as sa
+
+    if wanted is not None:
+        return [wanted]
+    clause, _ = select("control", held["control"])
+    column = clause.c[held["control"]["scn_id"]]
+    return [
+        int(row[0])
+        for row in connection.execute(sa.select(column).distinct().order_by(column))
+        if row[0] is not None
+    ]

@@ -30,6 +30,7 @@ from reconstruct.formats.netcdf_names import (
     TIME,
     WIDTH,
     find,
+    floats,
     times,
     to_number,
 )
@@ -219,7 +220,7 @@ def _swept(records: Records, usual_s: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _per_ray(data: "xr.Dataset", names: tuple[str, ...], rays: int) -> FloatArray:
-    values = np.asarray(data[find(data, names)].values, dtype=float).ravel()
+    values = floats(data, find(data, names)).ravel()
     return values if len(values) == rays else np.full(rays, values[0] if len(values) else np.nan)
 
 
@@ -241,7 +242,7 @@ def _sweep_numbers(
     if own is not None and data[own].values.ndim == 1 and len(data[own].values) == len(order):
         return np.asarray(data[own].values[order], dtype=np.intp)
     if "sweep_start_ray_index" in data:
-        starts = np.asarray(data["sweep_start_ray_index"].values, dtype=float).ravel()
+        starts = floats(data, "sweep_start_ray_index").ravel()
         starts = starts[np.isfinite(starts)]
         if len(starts) > 1:
             return np.asarray(np.searchsorted(np.sort(starts), order, "right") - 1, dtype=np.intp)
@@ -250,7 +251,7 @@ def _sweep_numbers(
 
 def _gates(data: "xr.Dataset", rays: int, path: Path) -> tuple[FloatArray, dict[str, FloatArray], list[str]]:
     """Ranges (gate,), quantities (ray, gate) and what was turned."""
-    ranges = np.asarray(data[find(data, RANGE)].values, dtype=float)
+    ranges = floats(data, find(data, RANGE))
     speed_name = find(data, SPEED)
     toward = "toward" in str(data[speed_name].attrs.get("standard_name", ""))
     found = {"radial_speed_mps": SPEED, "cnr_db": CNR, "spectral_width_mps": WIDTH, "quality": QUALITY}
@@ -281,9 +282,8 @@ def _gates(data: "xr.Dataset", rays: int, path: Path) -> tuple[FloatArray, dict[
 
 def _grid(data: "xr.Dataset", name: str | None, rays: int, ranges: FloatArray, path: Path) -> FloatArray:
     """(ray, gate) of a variable, transposed or unpacked where it has to be."""
-    values = np.asarray(data[name].values, dtype=float)
+    values = floats(data, name)
     gates = ranges.shape[-1] if ranges.ndim == 1 or ranges.shape[0] == rays else ranges.shape[0]
-    values = np.where(np.isfinite(values), values, np.nan)
     if values.shape == (rays, gates):
         return values
     if values.shape == (gates, rays):

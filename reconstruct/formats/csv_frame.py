@@ -10,6 +10,9 @@ from geometry.errors import InputError
 from reconstruct.formats.text import lines_of, utc_from_labview, utc_from_unix
 from reconstruct.losses import Loss
 
+#: Times outside are no times of a measurement (a fill value of 9999 reads as that year).
+BETWEEN = (pd.Timestamp("1970-01-01"), pd.Timestamp("2200-01-01"))
+
 
 def delimited_frame(
     path: Path, *, separator: str = ",", decimal: str = "."
@@ -39,7 +42,7 @@ def delimited_frame(
     bad = np.flatnonzero((widths > 0) & ~good)
     text = f"another number of fields than the {len(names)} of the header: the line is damaged"
     losses = [Loss(path.name, text, int(bad[0]) + 2, len(bad))] if len(bad) else []
-    body = "\n".join(line for line, fine in zip(lines[1:], good, strict=True) if fine)
+    body = "\n".join(line.replace('"', "") for line, fine in zip(lines[1:], good, strict=True) if fine)
     if not body:
         return pd.DataFrame({name: np.array([], dtype=float) for name in names}), losses
     frame = pd.read_csv(
@@ -58,7 +61,8 @@ def to_times(column: "pd.Series[str]", *, unit: str = "iso") -> "pd.Series[pd.Ti
     """
     if unit == "iso":
         parsed = pd.to_datetime(column.astype(str), utc=True, errors="coerce", format="ISO8601")
-        return parsed.dt.tz_localize(None).astype("datetime64[ns]")
+        plain = parsed.dt.tz_localize(None)
+        return plain.where(plain.between(*BETWEEN)).astype("datetime64[ns]")
     seconds = pd.to_numeric(column, errors="coerce").to_numpy(dtype=float)
     return pd.Series(
         utc_from_labview(seconds) if unit == "labview_s" else utc_from_unix(seconds), index=column.index

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.formats.text import seconds_delta
 from reconstruct.records import TimeArray
@@ -72,6 +73,13 @@ def find(data: "xr.Dataset", names: tuple[str, ...]) -> str | None:
     return None
 
 
+def floats(data: "xr.Dataset", name: str | None) -> FloatArray:
+    """A variable's numbers; what a damaged file holds instead of numbers becomes NaN."""
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        values = np.asarray(data[name].to_numpy(), dtype=float)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
 def times(data: "xr.Dataset", root: dict[str, Any], path: Path) -> TimeArray:
     """(ray,) UTC of the file's times; NaT where it has none.
 
@@ -87,7 +95,9 @@ def times(data: "xr.Dataset", root: dict[str, Any], path: Path) -> TimeArray:
             pd.to_datetime(values.astype(str), utc=True).tz_localize(None), dtype="datetime64[ns]"
         )
     reference = (
-        data["time_reference"].values if "time_reference" in data.variables else root.get("time_reference")
+        data["time_reference"].to_numpy()
+        if "time_reference" in data.variables
+        else root.get("time_reference")
     )
     units = str(variable.attrs.get("units", ""))
     found = _SINCE.match(units)
@@ -101,7 +111,7 @@ def times(data: "xr.Dataset", root: dict[str, Any], path: Path) -> TimeArray:
     year, month, day = found["date"].split("-")
     hour, _, rest = (found["clock"] or "00:00").partition(":")
     start = np.datetime64(f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest}", "ns")
-    seconds = values.astype(float) * _SECONDS[found["unit"]]
+    seconds = floats(data, find(data, TIME)) * _SECONDS[found["unit"]]
     known = np.isfinite(seconds)
     return np.where(known, start + seconds_delta(np.where(known, seconds, 0.0)), np.datetime64("NaT", "ns"))
 

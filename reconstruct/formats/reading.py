@@ -15,7 +15,7 @@ from reconstruct.formats.hpl import read_hpl
 from reconstruct.formats.nacelle import read_nacelle
 from reconstruct.formats.options import Options
 from reconstruct.formats.plain_csv import read_plain_csv
-from reconstruct.formats.text import decode, read_bytes
+from reconstruct.formats.text import decode, read_bytes, split_lines
 from reconstruct.formats.windscanner import EARLIEST_S, read_windscanner
 from reconstruct.losses import Loss, losses_text, merged_losses
 from reconstruct.record_tables import read_parquet
@@ -115,7 +115,7 @@ def detect(path: Path) -> Kind | Literal["companion"] | None:
         return "store"
     if raw[:4] == b"PAR1":
         return "parquet"
-    return _detect_text(decode(raw).splitlines())
+    return _detect_text(split_lines(decode(raw)))
 
 
 def _start(path: Path) -> bytes:

@@ -21,6 +21,9 @@ LABVIEW_TO_UNIX_S = 2_082_844_800.0
 #: A number of fields that fewer lines than this share have is a damaged line, unless it is rare as such.
 RARE_SHARE = 0.02
 
+#: Seconds that nanoseconds can count are fewer than this; a damaged number may be more.
+LATEST_S = 9.0e9
+
 #: How much of a damaged line an error shows.
 SHOWN_CHARACTERS = 40
 
@@ -70,7 +73,20 @@ def decode(raw: bytes) -> str:
 
 def lines_of(path: Path) -> list[str]:
     """The lines of a text file, whatever its encoding and line ends."""
-    return decode(read_bytes(path)).splitlines()
+    return split_lines(decode(read_bytes(path)))
+
+
+def split_lines(text: str) -> list[str]:
+    """Lines as editors count them; unlike `str.splitlines` no stray control character of a damaged file ends
+    one.
+
+    Examples
+    --------
+    >>> split_lines("a\\r\\nb\\x85c\\n")
+    ['a', 'b\\x85c']
+    """
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return lines[:-1] if lines and not lines[-1] else lines
 
 
 def number_tables(
@@ -133,15 +149,17 @@ def _numbers(rows: list[str], numbers: list[int], where: str, separator: str) ->
     try:
         return Table(_parsed(rows, separator), line), []
     except (ValueError, OverflowError):  # some field is no number: find which lines
-        good = [_is_numeric(row, separator) for row in rows]
+        parsed = [_numbers_of(row, separator) for row in rows]
         losses = [
             Loss(where, f"{rows[i][:SHOWN_CHARACTERS]!r} holds something that is no number", int(line[i]))
-            for i, fine in enumerate(good)
-            if not fine
+            for i, numbers_of_row in enumerate(parsed)
+            if numbers_of_row is None
         ]
-        kept = [row for row, fine in zip(rows, good, strict=True) if fine]
-        values = _parsed(kept, separator) if kept else np.empty((0, 0))
-        return Table(values, line[np.array(good)]), losses
+        good = np.array([numbers_of_row is not None for numbers_of_row in parsed])
+        values = np.array([row for row in parsed if row is not None], dtype=float)
+        return Table(
+            values.reshape(int(good.sum()), -1) if good.any() else np.empty((0, 0)), line[good]
+        ), losses
 
 
 def _parsed(rows: list[str], separator: str) -> FloatArray:
@@ -149,17 +167,16 @@ def _parsed(rows: list[str], separator: str) -> FloatArray:
     return frame.to_numpy(dtype=float)
 
 
-def _is_numeric(row: str, separator: str) -> bool:
+def _numbers_of(row: str, separator: str) -> list[float] | None:
+    """The numbers of one line; None if a field is no number."""
     try:
-        for field in row.split(separator):
-            float(field or "nan")
+        return [float(field or "nan") for field in row.split(separator)]
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def utc_from_unix(seconds: ArrayLike) -> TimeArray:
-    """(...,) times of seconds since 1970-01-01, to the microsecond; NaT where not finite.
+    """(...,) times of seconds since 1970-01-01, to the microsecond; NaT where there is none.
 
     Examples
     --------
@@ -167,7 +184,7 @@ def utc_from_unix(seconds: ArrayLike) -> TimeArray:
     2014-04-30T00:00:00.250000000
     """
     value = np.asarray(seconds, dtype=float)
-    known = np.isfinite(value)
+    known = np.abs(value) < LATEST_S
     whole = np.floor(np.where(known, value, 0.0))
     micro = np.round((np.where(known, value, 0.0) - whole) * 1e6)
     time = whole.astype("int64") * 10**9 + micro.astype("int64") * 1000
@@ -192,6 +209,8 @@ def labview_from_utc(time_utc: TimeArray) -> FloatArray:
 
 
 def seconds_delta(seconds: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.timedelta64]]:
-    """(...,) a time difference of seconds, to the microsecond."""
-    micro = np.round(np.asarray(seconds, dtype=float) * 1e6).astype("int64")
-    return np.asarray((micro * 1000).astype("timedelta64[ns]"))
+    """(...,) a time difference of seconds, to the microsecond; NaT where there is none."""
+    value = np.asarray(seconds, dtype=float)
+    known = np.abs(value) < LATEST_S
+    micro = np.round(np.where(known, value, 0.0) * 1e6).astype("int64")
+    return np.where(known, (micro * 1000).astype("timedelta64[ns]"), np.timedelta64("NaT", "ns"))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct.formats.gate_union import GateBlock, common_gates
 from reconstruct.formats.head_positions import RayPositions, ray_positions, read_attitude, read_positions
@@ -24,7 +24,7 @@ from reconstruct.formats.text import Table, lines_of, number_tables, seconds_del
 from reconstruct.losses import Loss, merged_losses
 from reconstruct.records import Records
 from reconstruct.sweep_ids import sweep_ids
-from reconstruct.sweep_lag import estimate_lead, sweep_rate, without_lead
+from reconstruct.sweep_lag import estimate_lead, evened, sweep_rate, without_lead
 
 #: Header fields of one ray; units without scan_id and los_id write the last six.
 LONG_HEADER, SHORT_HEADER = 8, 6
@@ -34,6 +34,9 @@ GATE_NUMBERS = 4
 
 #: Seconds since 1904 of any lidar campaign lie above this (1967-05), below it is no time.
 EARLIEST_S = 2.0e9
+
+#: They lie below this (2126).
+LATEST_S = 7.0e9
 
 
 class _Wind(NamedTuple):
@@ -96,21 +99,31 @@ def _split(table: Table, path: Path, losses: list[Loss]) -> _Wind | None:
         if (
             width <= size
             or (width - size) % GATE_NUMBERS
-            or not np.all(table.values[:, size - 4] > EARLIEST_S)
+            or np.mean(_is_time(table.values[:, size - 4])) < 0.5
         ):
             continue
         header = table.values[:, :size]
         if size == SHORT_HEADER:
             header = np.column_stack([np.zeros(len(header)), np.arange(len(header)), header])
         gates = table.values[:, size:].reshape(len(header), -1, GATE_NUMBERS)
-        whole = np.all(np.isfinite(header), axis=1) & np.all(np.isfinite(gates[..., 0]), axis=1)
+        whole = (
+            _is_time(header[:, 4])
+            & _is_time(header[:, 5])
+            & np.all(np.isfinite(header), axis=1)
+            & np.all(np.isfinite(gates[..., 0]), axis=1)
+        )
         if not np.all(whole):
-            text = "an empty field in the header or among the ranges"
+            text = "an empty field, or a time that is none, in the header or among the ranges"
             losses.append(Loss(path.name, text, int(table.line[~whole][0]), int(np.sum(~whole))))
         return _Wind(header[whole], GateBlock(gates[whole, :, 0], gates[whole, :, 1:]), table.line[whole])
     text = f"{width} fields are no ray: 6 or 8 header fields and 4 numbers for each gate are needed"
     losses.append(Loss(path.name, text, int(table.line[0]), len(table.line)))
     return None
+
+
+def _is_time(seconds: FloatArray) -> BoolArray:
+    """Whether numbers can be times of a campaign in seconds since 1904."""
+    return np.asarray((seconds > EARLIEST_S) & (seconds < LATEST_S))
 
 
 def _stored(
@@ -195,18 +208,20 @@ def _from_positions(records: Records, found: RayPositions) -> Records:
 
 def _from_estimate(records: Records, options: Options) -> Records:
     """Azimuths turned back by the lead that up- against down-sweeps show."""
+    even, moved = evened(records)
     try:
-        found = estimate_lead(records)
+        found = estimate_lead(even)
     except InputError as error:
         if options.azimuth == "estimate":
             raise
         return _noted(records, f"azimuths as stored: there is no scanner file, and {error}")
     note = (
         f"there is no scanner file: azimuths turned back by {found.lead_deg:.2f} +- {found.std_deg:.2f} deg, "
-        "the lead that "
-        f"up- against down-sweeps show ({found.sweeps} sweeps)"
+        f"the lead that up- against down-sweeps show ({found.sweeps} sweeps); {moved} rays off the even "
+        "motion "
+        "of their sweep were brought onto it"
     )
-    return _noted(without_lead(records, found.lead_deg), note)
+    return _noted(without_lead(even, found.lead_deg), note)
 
 
 def _noted(records: Records, note: str) -> Records:

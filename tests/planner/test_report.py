@@ -286,7 +286,10 @@ def test_a_spreadsheet_takes_no_name_for_a_formula() -> None:
 
 def test_scans_whose_long_names_begin_alike_stay_apart_in_the_scene() -> None:
     """The scene shortens names, and every layer needs its own."""
-    scene = plan_scene(Plan(small(mark=" " + "x" * 90, name="n")))
-    names = [layer.name for layer in scene.layers]
+    alike = [
+        {"name": "x" * 90 + end, "lidar": "A", "target": "P", "type": "stare", "accumulation_s": 0.5}
+        for end in "12"
+    ]
+    names = [layer.name for layer in plan_scene(Plan(small(scans=alike, pairs=[]))).layers]
     assert len(names) == len(set(names))
     assert max(map(len, names)) < 70

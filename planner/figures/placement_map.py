@@ -1,0 +1,184 @@
+"""Maps of where lidars may stand, what hinders elsewhere, and how wrong the wind would be."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from planner.figures.canvas import canvas, image
+from planner.palette import CROSSING, EXCLUDED, INK, INK_SOFT, MAST, PAPER, TURBINE, lidar_colour
+from planner.placement.maps import CRITERIA
+from planner.placement.ranking import Placement
+from planner.placement.search import UNSEEN
+from planner.placement.write import least_slack
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH_IN = 8.5
+SCALE_TOP = 2.0  # colours end at this multiple of the least error: farther out nobody wants to stand
+HINDERED = "#d9d5cf"
+COLOURS = "viridis_r"
+BAR_LABEL = {
+    "vector": "error of the wind vector [m/s]",
+    "speed": "error of the wind speed [m/s]",
+    "direction": "error of the wind direction [°]",
+}
+
+
+def error_map(found: Placement) -> bytes:
+    """Draw the error that a lidar at each place can be part of, with the ranked and declared places, as a PNG."""
+    error = np.where(found.error < np.sqrt(UNSEEN), found.error, np.nan).reshape(found.grid.shape)
+    high, wide = _size(found)
+    with canvas(WIDTH_IN, WIDTH_IN * high / wide * 0.8 + 1.1) as figure:
+        axes = figure.add_subplot()
+        _frame(axes, found)
+        _hindered(axes, found)
+        least = float(np.nanmin(error[np.isfinite(error)]))
+        kept = np.where(np.isfinite(error), error, np.nan)
+        shown = axes.pcolormesh(
+            *_middle(found), kept, cmap=COLOURS, vmin=least, vmax=SCALE_TOP * least, shading="nearest", rasterized=True
+        )
+        extend = "max" if np.nanmax(kept) > SCALE_TOP * least else "neither"
+        bar = figure.colorbar(shown, ax=axes, shrink=0.8, extend=extend)
+        bar.set_label(BAR_LABEL[found.task.criterion], color=INK)
+        _things(axes, found)
+        axes.set_title(_title(found), parse_math=False)
+        _legend(figure, axes)
+        return image(figure)
+
+
+def criteria_maps(found: Placement) -> bytes:
+    """Draw one small map for each criterion that hinders anywhere: what is left over of it, as a PNG."""
+    slack = {name: values for name, values in least_slack(found.seen).items() if not np.all(values >= 0.0)}
+    names = list(slack) or ["range-max"]
+    columns = min(len(names), 3)
+    rows = -(-len(names) // columns)
+    high, wide = _size(found)
+    with canvas(3.4 * columns, (3.2 * high / wide + 0.9) * rows) as figure:
+        panels = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
+        for axes, name in zip(panels, names, strict=False):
+            _criterion(figure, axes, found, name, slack.get(name, least_slack(found.seen)[name]))
+        for axes in panels[len(names) :]:
+            axes.set_visible(False)
+        return image(figure)
+
+
+def _criterion(figure: "Figure", axes: "Axes", found: Placement, name: str, slack: FloatArray) -> None:
+    unit, meaning = CRITERIA[name]
+    values = np.where(np.isfinite(slack), slack, np.nan).reshape(found.grid.shape)
+    top = float(np.nanmax(np.abs(values), initial=1e-9))
+    shown = axes.pcolormesh(*_middle(found), values, cmap="RdYlBu", vmin=-top, vmax=top, shading="nearest", rasterized=True)
+    if np.nanmin(values) < 0.0 < np.nanmax(values):
+        axes.contour(*_middle(found), values, levels=[0.0], colors=[INK], linewidths=1.0)
+    figure.colorbar(shown, ax=axes, shrink=0.75, location="bottom", label=f"left over [{unit}]; red: not allowed")
+    axes.set_title(meaning, fontsize=9, wrap=True)
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for target in found.task.targets_m:
+        axes.plot(*_from_middle(found, target[None])[0], marker="*", color=CROSSING, markersize=8, markeredgecolor=PAPER)
+
+
+def _title(found: Placement) -> str:
+    task = found.task
+    many = "" if len(task.targets) == 1 else f", {task.aggregate} of {len(task.targets)} targets"
+    if task.single:
+        return f"{task.site.name}: sector scan from each place{many}"
+    with_whom = " and ".join(lidar.name for lidar in task.fixed) or "its best partner"
+    return f"{task.site.name}: a lidar at each place with {with_whom}{many}"
+
+
+def _size(found: Placement) -> tuple[float, float]:
+    grid = found.grid
+    return abs(float(grid.north_m[0] - grid.north_m[-1])), abs(float(grid.east_m[-1] - grid.east_m[0]))
+
+
+def _origin(found: Placement) -> FloatArray:
+    """(2,) easting and northing that the axes count from [m]: round, near the targets."""
+    return np.asarray(np.round(found.task.targets_m[:, :2].mean(axis=0)))
+
+
+def _middle(found: Placement) -> tuple[FloatArray, FloatArray]:
+    origin = _origin(found)
+    return found.grid.east_m - origin[0], found.grid.north_m - origin[1]
+
+
+def _from_middle(found: Placement, points_m: FloatArray) -> FloatArray:
+    return np.asarray(points_m[:, :2] - _origin(found))
+
+
+def _frame(axes: "Axes", found: Placement) -> None:
+    east, north = _middle(found)
+    half = found.grid.spacing_m / 2
+    axes.set_xlim(east[0] - half, east[-1] + half)
+    axes.set_ylim(north[-1] - half, north[0] + half)
+    axes.set_aspect("equal")
+    axes.grid(False)
+    origin = _origin(found)
+    axes.set_xlabel(f"easting less {origin[0]:.0f} [m]")
+    axes.set_ylabel(f"northing less {origin[1]:.0f} [m]")
+
+
+def _hindered(axes: "Axes", found: Placement) -> None:
+    """Grey ground where no lidar may stand."""
+    from matplotlib.colors import ListedColormap
+
+    out = np.where(found.seen.allowed.all(axis=0), np.nan, 1.0).reshape(found.grid.shape)
+    axes.pcolormesh(*_middle(found), out, cmap=ListedColormap([HINDERED]), shading="nearest", rasterized=True)
+    axes.plot([], [], marker="s", color=HINDERED, markersize=10, linestyle="none", label="not allowed")
+
+
+def _things(axes: "Axes", found: Placement) -> None:
+    site, task = found.task.site, found.task
+    if site.turbines:
+        points = _from_middle(found, np.array([turbine.position for turbine in site.turbines]))
+        axes.plot(*points.T, "o", color=PAPER, markeredgecolor=TURBINE, markeredgewidth=1.5, markersize=7, label="turbine")
+    if site.masts:
+        points = _from_middle(found, np.array([mast.position for mast in site.masts]))
+        axes.plot(*points.T, "^", color=MAST, markeredgecolor=PAPER, markersize=9, label="mast")
+    targets = _from_middle(found, task.targets_m)
+    axes.plot(*targets.T, "*", color=PAPER, markeredgecolor=CROSSING, markersize=11, linestyle="none", label="target")
+    for lidar in task.fixed:
+        index = site.lidars.index(lidar)
+        here = _from_middle(found, np.array([lidar.position]))[0]
+        axes.plot(*here, "D", color=lidar_colour(index), markeredgecolor=PAPER, markersize=9, linestyle="none")
+        axes.plot([here[0], targets[0, 0]], [here[1], targets[0, 1]], color=lidar_colour(index), linewidth=1.5)
+        _name(axes, lidar.name, here)
+    _ranked(axes, found, targets[0])
+
+
+def _ranked(axes: "Axes", found: Placement, target: FloatArray) -> None:
+    if found.declared is not None:
+        for lidar, here in zip(found.task.replaced, _from_middle(found, found.declared.positions_m), strict=True):
+            axes.plot(*here, "D", color=PAPER, markeredgecolor=EXCLUDED, markeredgewidth=1.8, markersize=8, linestyle="none")
+            _name(axes, f"{lidar.name} as declared", here)
+    for item in reversed(found.ranked):
+        best = item.rank == 1
+        for here in _from_middle(found, item.positions_m):
+            axes.plot(*here, "D", color=EXCLUDED if best else PAPER, markeredgecolor=PAPER if best else INK_SOFT, markersize=10 if best else 7)
+            if best:
+                axes.plot([here[0], target[0]], [here[1], target[1]], color=EXCLUDED, linewidth=1.5)
+            _name(axes, f"{item.rank}", here)
+
+
+def _name(axes: "Axes", text: str, here: FloatArray) -> None:
+    from matplotlib.patheffects import withStroke
+
+    low, high = axes.get_xlim()
+    right = here[0] > low + 0.75 * (high - low)
+    axes.annotate(
+        text, tuple(here), xytext=(-9 if right else 9, 6), textcoords="offset points", ha="right" if right else "left",
+        fontsize=9, color=INK, parse_math=False, path_effects=[withStroke(linewidth=2.5, foreground=PAPER)], zorder=9,
+    )
+
+
+def _legend(figure: "Figure", axes: "Axes") -> None:
+    axes.plot([], [], "D", color=EXCLUDED, markeredgecolor=PAPER, markersize=10, linestyle="none", label="best place")
+    axes.plot([], [], "D", color=PAPER, markeredgecolor=INK_SOFT, markersize=7, linestyle="none", label="next best, by rank")
+    if not found.task.single:
+        axes.plot([], [], "s", color=PAPER, markeredgecolor=INK_SOFT, markersize=9, linestyle="none", label="beams cross too flat")
+    figure.legend(loc="outside lower left", ncols=4)
+
+

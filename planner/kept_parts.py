@@ -1,0 +1,103 @@
+"""What an unfinished run has done so far: the result of each part of the data, as a file of plain arrays."""
+
+import io
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.output import write_bytes
+from planner.scan_retrieval import ScanPart
+from reconstruct.automatic_filter import Agreement
+from reconstruct.averaging import PeriodSums
+from reconstruct.filters import Step
+from reconstruct.pairing import RaySeries
+from reconstruct.records import Records
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class Kept(NamedTuple):
+    """The result of one part."""
+
+    part: ScanPart
+    pending: Records | None  # the last pass, which the next part may go on with
+    notes: tuple[str, ...]
+
+
+def write_kept(place: Path, mark: str, kept: Kept) -> None:
+    """Keep the result of a part, whole or not at all.
+
+    Parameters
+    ----------
+    place
+        Its file.
+    mark
+        What it was made of: `read_kept` gives it back for the same mark alone.
+    kept
+        The result.
+    """
+    part = kept.part
+    head = {
+        "mark": mark,
+        "notes": kept.notes,
+        "steps": [list(step) for step in part.steps],
+        "agreement": list(part.agreement),
+        "offset_deg": part.offset_deg,
+        "sums": [list(key) for key in part.sums],
+        "instrument": None if kept.pending is None else kept.pending.instrument,
+    }
+    arrays: Arrays = {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
+    arrays |= {f"fast {name}": values for name, values in part.fast.items()}
+    arrays |= {f"series {name}": values for name, values in part.series._asdict().items()}
+    for number, sums in enumerate(part.sums.values()):
+        arrays |= {f"sums {number} {field.name}": np.asarray(getattr(sums, field.name)) for field in fields(sums)}
+    if kept.pending is not None:
+        rays = kept.pending
+        arrays |= {f"pending {name}": values for name, values in {**rays.ray_fields(), **rays.gate_fields()}.items()}
+        arrays["pending range_m"] = rays.range_m
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, **arrays)
+    write_bytes(place, buffer.getvalue())
+
+
+def read_kept(place: Path, mark: str) -> Kept | None:
+    """The result of a part; None where there is none, or it was made of other data or settings."""
+    if not place.is_file():
+        return None
+    with np.load(place, allow_pickle=False) as file:
+        arrays: Arrays = dict(file.items())
+    head = json.loads(arrays.pop("head").tobytes())
+    if head["mark"] != mark:
+        return None
+    sums = {tuple(key): _sums(arrays, number) for number, key in enumerate(head["sums"])}
+    part = ScanPart(
+        fast=_named(arrays, "fast "),
+        sums=sums,
+        series=RaySeries(**_named(arrays, "series ")),
+        steps=tuple(Step(*step) for step in head["steps"]),
+        agreement=Agreement(*head["agreement"]),
+        offset_deg=head["offset_deg"],
+    )
+    waiting = _named(arrays, "pending ")
+    pending = Records(instrument=head["instrument"], **waiting) if waiting else None
+    return Kept(part, pending, tuple(head["notes"]))
+
+
+def read_series(place: Path) -> RaySeries:
+    """Only the rays at the target of a kept part."""
+    with np.load(place, allow_pickle=False) as file:
+        return RaySeries(*(file[f"series {name}"] for name in RaySeries._fields))
+
+
+def _named(arrays: Arrays, start: str) -> dict[str, Any]:
+    """The arrays of one kind, by their own names."""
+    return {name.removeprefix(start): values for name, values in arrays.items() if name.startswith(start)}
+
+
+def _sums(arrays: Arrays, number: int) -> PeriodSums:
+    found = _named(arrays, f"sums {number} ")
+    return PeriodSums(period_s=float(found.pop("period_s")), **found)
