@@ -62,7 +62,9 @@ def passing(start_m: ArrayLike, end_m: ArrayLike, solids: Solids) -> Passing:
     """
     start, end = np.broadcast_arrays(np.asarray(start_m, dtype=float), np.asarray(end_m, dtype=float))
     if start.ndim == 0 or start.shape[-1] != 3:
-        raise InputError(f"beams with ends of shape {start.shape} came; allowed is (..., 3): east, north, up in metres")
+        raise InputError(
+            f"beams with ends of shape {start.shape} came; allowed is (..., 3): east, north, up in metres"
+        )
     shape = start.shape[:-1]
     start, end = start.reshape(-1, 3), end.reshape(-1, 3)
     best, which = np.full(len(start), np.inf), np.full(len(start), -1, dtype=np.intp)

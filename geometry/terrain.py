@@ -57,7 +57,11 @@ class HeightRaster:
     def __post_init__(self) -> None:
         heights = np.array(self.height_m, dtype=np.float64)
         sizes = (self.cell_east_m, self.cell_north_m)
-        if heights.ndim != 2 or min(heights.shape) < 2 or not all(np.isfinite(size) and size > 0 for size in sizes):
+        if (
+            heights.ndim != 2
+            or min(heights.shape) < 2
+            or not all(np.isfinite(size) and size > 0 for size in sizes)
+        ):
             raise InputError(
                 f"a height raster of shape {heights.shape} with cells of {sizes} m came; allowed are at least 2 x 2 "
                 "cells of positive size. Turn or warp a raster that is not north-up first."
@@ -267,7 +271,9 @@ def terrain_sight(
     """
     gates = np.asarray(shares, dtype=np.float64)
     if gates.ndim != 1 or gates.size == 0 or np.any(np.diff(gates) < 0) or gates[0] <= 0 or gates[-1] > 1:
-        raise InputError(f"gates at the shares {gates.tolist()} came; allowed are ascending shares over 0, up to 1")
+        raise InputError(
+            f"gates at the shares {gates.tolist()} came; allowed are ascending shares over 0, up to 1"
+        )
     head, end = np.broadcast_arrays(np.asarray(head_m, np.float64), np.asarray(end_m, np.float64))
     shape = head.shape[:-1]
     head, end = head.reshape(-1, 3), end.reshape(-1, 3)
@@ -302,7 +308,7 @@ def _sight(
 def _cells_crossed(raster: HeightRaster, head: FloatArray, end: FloatArray) -> FloatArray:
     """(2, beam) how many lines through the middles of cells each beam crosses, running north and running east."""
     east, north = np.abs(end - head)[:, :2].T
-    return np.ceil(np.stack([east / raster.cell_east_m, north / raster.cell_north_m])) + 1.0
+    return np.asarray(np.ceil(np.stack([east / raster.cell_east_m, north / raster.cell_north_m])) + 1.0)
 
 
 def _crossings(raster: HeightRaster, head: FloatArray, end: FloatArray, gates: FloatArray) -> FloatArray:
@@ -317,7 +323,9 @@ def _crossings(raster: HeightRaster, head: FloatArray, end: FloatArray, gates: F
         start = (head[:, axis] - first) / size - 0.5
         along = (end[:, axis] - head[:, axis]) / size
         forward = np.sign(along)
-        lines = np.where(forward > 0, np.floor(start), np.ceil(start))[:, None] + forward[:, None] * (1 + np.arange(count))
+        lines = np.where(forward > 0, np.floor(start), np.ceil(start))[:, None] + forward[:, None] * (
+            1 + np.arange(count)
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             share = (lines - start[:, None]) / along[:, None]
         shares.append(np.where((share > 0.0) & (share < gates[-1]), share, gates[-1]))

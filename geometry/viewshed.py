@@ -57,7 +57,9 @@ class Horizon:
         at = np.maximum(ring, 0)
         left, right = flat[(first % spokes) * rings + at], flat[((first + 1) % spokes) * rings + at]
         with np.errstate(invalid="ignore"):
-            slope = np.where(np.isfinite(left) & np.isfinite(right), left + part * (right - left), np.maximum(left, right))
+            slope = np.where(
+                np.isfinite(left) & np.isfinite(right), left + part * (right - left), np.maximum(left, right)
+            )
         needed = self.target_m[2] + slope * distance + bulge_m(distance, self.refraction)
         inside = self.raster.covers(east_m, north_m)
         return np.where(inside, np.where(ring < 0, -np.inf, needed), np.inf)
@@ -112,7 +114,9 @@ def horizon(
         )
     west, south, east, north = raster.bounds_m
     cell = min(raster.cell_east_m, raster.cell_north_m)
-    reach = float(np.hypot(max(target[0] - west, east - target[0]), max(target[1] - south, north - target[1])))
+    reach = float(
+        np.hypot(max(target[0] - west, east - target[0]), max(target[1] - south, north - target[1]))
+    )
     step = STEP_CELLS * cell
     rings = max(int(np.ceil(reach / step)), 1)
     spokes = max(int(np.ceil(TURN_RAD * reach / (SPOKE_CELLS * cell))), 8)
@@ -121,7 +125,9 @@ def horizon(
     return Horizon(raster, target, step, np.where(np.isnan(slope), np.inf, slope), refraction)
 
 
-def viewshed(raster: HeightRaster, target_m: ArrayLike, *, refraction: float = REFRACTION_COEFFICIENT) -> FloatArray:
+def viewshed(
+    raster: HeightRaster, target_m: ArrayLike, *, refraction: float = REFRACTION_COEFFICIENT
+) -> FloatArray:
     """How high above the ground a head has to stand in every cell to see a target.
 
     Returns

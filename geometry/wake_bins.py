@@ -57,7 +57,9 @@ def disturbed_bins(
     """
     samples = np.asarray(samples_m, dtype=np.float64)
     if samples.ndim != 3 or samples.shape[-1] != 3:
-        raise InputError(f"samples of shape {samples.shape} came; allowed is (measurement, sample, 3) in metres")
+        raise InputError(
+            f"samples of shape {samples.shape} came; allowed is (measurement, sample, 3) in metres"
+        )
     points, count = samples.reshape(-1, 3), samples.shape[0]
     owner = np.repeat(np.arange(count), samples.shape[1])
     steps = np.zeros((count, 2 * BINS + 1), dtype=np.intp)

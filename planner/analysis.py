@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 VERSION = 1  # of what is kept of a part; another one is worked on anew
 WORK = ".parts"
 UNSYNCHRONISED_GAP_S = 5.0  # the study's best
+NO_SIZE = 0.0  # stands for the sector size of a pair among keys: NaN equals nothing, not even itself
 
 Progress = Callable[[float], None]
 
@@ -47,6 +48,7 @@ class Retrieved(NamedTuple):
     steps: dict[str, tuple[Step, ...]]  # by scan
     agreements: dict[str, Agreement]
     notes: dict[str, tuple[str, ...]]
+    offsets_deg: dict[str, float]  # of the measured azimuths from the planned ones, the largest of the parts
     means: dict[float, "pd.DataFrame"]  # by period [s]
     gaps: dict[str, tuple[GapResult, ...]]  # by pair, without winds
     resumed: int  # parts that an earlier run had done
@@ -77,7 +79,7 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
     work = campaign.output / WORK / key_of(loaded)
     if restart:
         shutil.rmtree(campaign.output / WORK, ignore_errors=True)
-    steps, agreements, notes = {}, {}, {}
+    steps, agreements, notes, offsets = {}, {}, {}, {}
     sums: dict[tuple[str, float, float], list[PeriodSums]] = {}
     resumed = 0
     with output_folder(campaign.output) as folder:
@@ -93,12 +95,12 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
                     sums.setdefault((item.scan, sector_deg, period_s), []).append(part)
                 _tell(progress, (number + share) / (len(campaign.inputs) + bool(campaign.pairs)))
             steps[item.scan], agreements[item.scan] = merged.steps, merged.agreement
-            notes[item.scan] = merged.notes
+            notes[item.scan], offsets[item.scan] = merged.notes, merged.offset_deg
         gaps = {}
         for pair in campaign.pairs:
             gaps[pair.pair] = _retrieve_pair(pair, campaign, plan, work, folder, sums)
         means = _write_means(folder, campaign, plan, sums)
-        found = Retrieved(campaign.output, steps, agreements, notes, means, gaps, resumed)
+        found = Retrieved(campaign.output, steps, agreements, notes, offsets, means, gaps, resumed)
         _write_fast_parquet(folder)
         _write_log(folder, loaded, found)
     shutil.rmtree(campaign.output / WORK, ignore_errors=True)
@@ -130,6 +132,7 @@ class _Merged:
         self._steps: dict[str, Step] = {}
         self.agreement = Agreement(0, 0, 0, 0)
         self.notes: tuple[str, ...] = ()
+        self.offset_deg = 0.0
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -143,6 +146,7 @@ class _Merged:
         both = zip(self.agreement, kept.part.agreement, strict=True)
         self.agreement = Agreement(*(one + other for one, other in both))
         self.notes = tuple(dict.fromkeys((*self.notes, *kept.notes)))
+        self.offset_deg = max(self.offset_deg, kept.part.offset_deg, key=abs)
 
 
 def _worked(
@@ -248,7 +252,7 @@ def _write_means(
             means = means_of(add_sums(parts))
             frame = means.frame()
             frame.insert(0, "scan", scan)
-            frame.insert(1, "sector_deg", sector_deg)
+            frame.insert(1, "sector_deg", np.nan if sector_deg == NO_SIZE else sector_deg)
             frame["availability"] = means.availability(_interval_s(plan, scan))
             frames.append(frame)
         if not frames:
@@ -304,7 +308,7 @@ def _retrieve_pair(
                 period_s=period_s,
                 shift_s=campaign.averaging.time_shift_s,
             )
-            sums.setdefault((pair.pair, float("nan"), period_s), []).append(part)
+            sums.setdefault((pair.pair, NO_SIZE, period_s), []).append(part)
         if pair.compare_gaps_s:
             compared.append(compare_gaps(first, second, gaps_s=pair.compare_gaps_s))
     return tuple(_added(results) for results in zip(*compared, strict=True))
@@ -365,6 +369,7 @@ def _write_log(folder: Path, loaded: Loaded, found: Retrieved) -> None:
     lines = [f"campaign {loaded.campaign.name}, site {loaded.site.name}"]
     for scan, steps in found.steps.items():
         lines += ["", f"scan {scan}", *(f"  {note}" for note in found.notes[scan])]
+        lines.append(f"  measured azimuths less the planned ones: {found.offsets_deg[scan]:+.3f}°")
         lines += [f"  {told(step)}" for step in steps]
         agreement = found.agreements[scan]
         if any(agreement):

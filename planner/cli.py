@@ -29,6 +29,8 @@ COMMANDS = (
     "retrieve",
     "compare",
     "tour",
+    "export",
+    "cnr_map",
 )  # modules of planner.commands, in the order of the help
 
 BAD_INPUT = 2

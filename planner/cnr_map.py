@@ -125,7 +125,7 @@ def plan_map(
     beam_deg, size_deg = beam_width_m * per_m, sought_target.size_m * per_m
     seconds = accumulation_s or device.min_accumulation_s or DEFAULT_ACCUMULATION_S
     windows = _windows(chosen, sought_target, seen, beam_deg, size_deg, order, seconds)
-    probe = _probe(chosen, pulse_ns, fft_points)
+    probe = map_probe(chosen, pulse_ns, fft_points)
     gates, notes = _gates(chosen, seen, probe)
     around = neighbours(places, chosen)
     carrier = sought_target.on or sought_target.name
@@ -244,8 +244,14 @@ def _window(
     return Window(stage, across, upward, order, seconds, scan.sweep_s)
 
 
-def _probe(lidar: Lidar, pulse_ns: float | None, fft_points: int | None) -> Probe:
-    """Pulse and window to map with."""
+def map_probe(lidar: Lidar, pulse_ns: float | None, fft_points: int | None) -> Probe:
+    """Pulse and window to map with.
+
+    Raises
+    ------
+    InputError
+        If neither the options nor the instrument give them.
+    """
     mode = lidar.device.pulse(pulse_ns)
     pulse = pulse_ns if pulse_ns is not None else mode.pulse_ns if mode else None
     samples = fft_points if fft_points is not None else mode.fft_points if mode else None

@@ -139,14 +139,14 @@ def candidates(places: Places, lidar: Lidar) -> list[Sighting]:
     site, device = places.site, lidar.device
     declared = [(item, site.target_position_m(item)) for item in site.hard_targets]
     tops = [item for item in _undeclared(site) if item[0].name not in {target.on for target, _ in declared}]
-    around = neighbours(places, lidar)
+    fixed = [item for item in neighbours(places, lidar) if item.part != "rotor"]  # which hides it at times only
     found = []
     for target, position in (*declared, *tops):
         seen = expected(places, lidar, position, target.uncertainty_m)
         reach = float(seen.true.range_m)
         if not (device.min_range_m or 0.0) <= reach <= (device.max_range_m or np.inf):
             continue
-        if hiding(around, seen.true, carrier=target.on or target.name):
+        if hiding(fixed, seen.true, carrier=target.on or target.name):
             continue
         found.append(
             Sighting(
@@ -203,13 +203,11 @@ def neighbours(places: Places, lidar: Lidar) -> list[Neighbour]:
 
 
 def _upright(name: str, part: str, base: FloatArray, height_m: float, radius_m: float) -> Neighbour:
-    """The rectangle around an upright cylinder."""
+    """The rectangle around an upright cylinder: its ends as the nearer or the farther side shows them."""
     plan_m = float(np.hypot(base[0], base[1]))
     near_m = max(plan_m - radius_m, 1e-3)
     half = 180.0 if plan_m <= radius_m else float(np.rad2deg(np.arcsin(radius_m / plan_m)))
-    top, bottom = (
-        max(np.arctan2(height, near_m), np.arctan2(height, plan_m + radius_m), key=sign)
-        for height, sign in ((base[2] + height_m, lambda a: a), (base[2], lambda a: -a))
-    )
-    azimuth = float(beam_to(base).azimuth_deg)
-    return Neighbour(name, part, azimuth, half, float(np.rad2deg(bottom)), float(np.rad2deg(top)), near_m)
+    reach = np.array([near_m, plan_m + radius_m])
+    top = float(np.rad2deg(np.arctan2(base[2] + height_m, reach)).max())
+    bottom = float(np.rad2deg(np.arctan2(base[2], reach)).min())
+    return Neighbour(name, part, float(beam_to(base).azimuth_deg), half, bottom, top, near_m)

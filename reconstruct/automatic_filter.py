@@ -11,6 +11,7 @@ compares with. CNR counts on its low side only: a strong echo is a hard target, 
 """
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ WINDOW_SCANS = 50  # ten minutes of the reference study's 12 s scans
 DISTANCE = 5.0  # robust standard deviations: 4e-6 of normal rays lie beyond it in two dimensions
 LEAST_SPEED_STD_MPS = 0.1  # a lidar's own noise: a calm laminar hour must not make outliers of good rays
 LEAST_CNR_STD_DB = 0.5
+SHORT_SHARE = 5  # windows of a fifth of the length stand beside: what lasts two minutes is no outlier
+SHORTEST_SCANS = 10
 
 
 class Window(NamedTuple):
@@ -63,9 +66,10 @@ def filter_outliers(
 
     Notes
     -----
-    Windows overlap by half, so that a ray lies in two of them. In each, with s the robust standard deviations
-    there, its distance is d² = (Δv/s_v)² + (min(ΔCNR, 0)/s_c)²; it is kept where d is small enough in either: at
-    a front, a ray belongs to what came before or to what comes after.
+    Windows overlap by half, and others of a fifth of the length do so beside them: a ray lies in about four. In
+    each, with s the robust standard deviations there, its distance is d² = (Δv/s_v)² + (min(ΔCNR, 0)/s_c)²; it is
+    kept where d is small enough in any of them. So a ray at a front belongs to what came before or to what comes
+    after, and a gust of minutes to itself.
 
     Examples
     --------
@@ -75,15 +79,15 @@ def filter_outliers(
     [[7, 1]]
     """
     speed = np.asarray(radial_speed_mps, dtype=float)
-    if speed.ndim != 2 or (cnr_db is not None and np.shape(cnr_db) != speed.shape):
-        raise InputError(
-            f"radial speeds {speed.shape} and CNR {np.shape(cnr_db)} came: both have to be (scan, ray)"
-        )
+    cnr_shape = speed.shape if cnr_db is None else np.asarray(cnr_db).shape
+    if speed.ndim != 2 or cnr_shape != speed.shape:
+        raise InputError(f"radial speeds {speed.shape} and CNR {cnr_shape} came: both have to be (scan, ray)")
     if window.scans < 3:
         raise InputError(f"a window of {window.scans} scans came: 3 or more are needed for a median")
     cnr = None if cnr_db is None else np.where(np.isfinite(speed), np.asarray(cnr_db, dtype=float), np.nan)
     nearest = np.full(speed.shape, np.inf)
-    for part in _windows(len(speed), window.scans):
+    short = max(window.scans // SHORT_SHARE, SHORTEST_SCANS)
+    for part in chain(_windows(len(speed), window.scans), _windows(len(speed), short)):
         distance = np.square(_deviation(speed[part], window.least_speed_std_mps))
         if cnr is not None:
             faint = np.minimum(_deviation(cnr[part], window.least_cnr_std_db), 0.0)

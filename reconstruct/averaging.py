@@ -144,7 +144,7 @@ def add_sums(parts: Iterable[PeriodSums]) -> PeriodSums:
     added: list[FloatArray] = []
     for field in fields(PeriodSums)[2:]:
         values = np.concatenate([getattr(part, field.name) for part in found]).astype(float)
-        added.append(np.bincount(place, weights=values, minlength=len(number)))
+        added.append(np.bincount(place, weights=values, minlength=len(number)).astype(float))
     return PeriodSums(lengths.pop(), number, added[0].round().astype(np.intp), *added[1:])
 
 

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from geometry.arrays import ArrayLike, BoolArray, FloatArray
+from geometry.arrays import ArrayLike, BoolArray, FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct.climate import Climate
 from reconstruct.lidar_map import radial_variance_m2s2
@@ -49,9 +49,15 @@ class BeamTable(NamedTuple):
         """Number of candidates."""
         return int(self.east.shape[1])
 
-    def take(self, index: ArrayLike | slice) -> "BeamTable":
+    def take(self, index: slice | IntArray | list[int]) -> "BeamTable":
         """The table of some candidates."""
-        return BeamTable(*(part[..., index] for part in self))
+        return BeamTable(
+            self.east[:, index],
+            self.north[:, index],
+            self.cosine[:, index],
+            self.tensor[:, :, index],
+            self.seen[:, index],
+        )
 
 
 def condensed(climate: Climate, like: WindState, criterion: Criterion) -> Climate:
@@ -74,7 +80,7 @@ def condensed(climate: Climate, like: WindState, criterion: Criterion) -> Climat
     power = -2.0 if criterion == "direction" else 2.0
     with np.errstate(divide="ignore"):
         moment = np.bincount(which, climate.weight * climate.speed_mps**power) / weight
-    return Climate(moment ** (1.0 / power), angles, weight)
+    return Climate(moment ** (1.0 / power), angles, np.asarray(weight, dtype=np.float64))
 
 
 def beam_table(
@@ -130,19 +136,26 @@ def beam_table(
     >>> set_variance([table.take([0]), table.take([1])]).round(6)
     array([[0.02]])
     """
-    heads, targets = np.asarray(heads_m, dtype=float).reshape(-1, 3), np.asarray(targets_m, dtype=float).reshape(-1, 3)
+    heads, targets = (
+        np.asarray(heads_m, dtype=float).reshape(-1, 3),
+        np.asarray(targets_m, dtype=float).reshape(-1, 3),
+    )
     if not len(targets) == len(climates) == len(like):
         raise InputError(
             f"{len(targets)} targets came with {len(climates)} climates and {len(like)} states: give one each"
         )
     shape = (len(targets), len(heads))
-    noise = np.broadcast_to(np.asarray(sources.radial_speed_mps if noise_mps is None else noise_mps, float), shape)
+    noise = np.broadcast_to(
+        np.asarray(sources.radial_speed_mps if noise_mps is None else noise_mps, float), shape
+    )
     states = _states([condensed(*pair, criterion) for pair in zip(climates, like, strict=True)], like)
     out = np.empty((6, *shape))
     step = max(CHUNK // len(targets), 1)
     for start in range(0, len(heads), step):
         part = slice(start, start + step)
-        out[:, :, part] = _beams(heads[part], targets, states, replace(sources, radial_speed_mps=0.0), noise[:, part], criterion)
+        out[:, :, part] = _beams(
+            heads[part], targets, states, replace(sources, radial_speed_mps=0.0), noise[:, part], criterion
+        )
     clear = np.ones(shape, dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
     return BeamTable(out[0], out[1], out[2], out[3:], clear)
 
@@ -161,7 +174,11 @@ class _States(NamedTuple):
 
 def _states(climates: Sequence[Climate], like: Sequence[WindState]) -> _States:
     most = max(climate.count for climate in climates)
-    weight, speed, angle = np.zeros((most, len(climates))), np.ones((most, len(climates))), np.zeros((most, len(climates)))
+    weight, speed, angle = (
+        np.zeros((most, len(climates))),
+        np.ones((most, len(climates))),
+        np.zeros((most, len(climates))),
+    )
     for number, climate in enumerate(climates):
         weight[: climate.count, number] = climate.weight
         speed[: climate.count, number] = climate.speed_mps
@@ -169,8 +186,11 @@ def _states(climates: Sequence[Climate], like: Sequence[WindState]) -> _States:
     lateral = {state.lateral_gradient_per_s for state in like}
     if len(lateral) > 1:
         raise InputError(f"lateral gradients {sorted(lateral)} came; all targets share one")
-    others = (np.array([getattr(state, name) for state in like]) for name in ("shear_exponent", "height_m", "vertical_mps"))
-    return _States(weight, speed, angle, *others, lateral_per_s=lateral.pop())
+    shear, height, vertical = (
+        np.array([getattr(state, name) for state in like], dtype=np.float64)
+        for name in ("shear_exponent", "height_m", "vertical_mps")
+    )
+    return _States(weight, speed, angle, shear, height, vertical, lateral.pop())
 
 
 def _beams(
@@ -200,7 +220,12 @@ def _beams(
 
 
 def _view(
-    beam: FloatArray, sine: FloatArray, distance: FloatArray, along: FloatArray, speed: FloatArray, states: _States
+    beam: FloatArray,
+    sine: FloatArray,
+    distance: FloatArray,
+    along: FloatArray,
+    speed: FloatArray,
+    states: _States,
 ) -> View:
     """Beams and the air in their gates, (target, candidate)."""
     east, north = beam[0] * beam[2], beam[1] * beam[2]
@@ -250,7 +275,9 @@ def pair_variance(first: BeamTable, second: BeamTable, target: int) -> tuple[Flo
     ours, across_ours = _factors(first, target)
     theirs, across_theirs = _factors(second, target)
     wanted = np.concatenate([ours, across_ours]).T @ np.concatenate([across_theirs, theirs])
-    sine = np.stack([first.east[target], -first.north[target]]).T @ np.stack([second.north[target], second.east[target]])
+    sine = np.stack([first.east[target], -first.north[target]]).T @ np.stack(
+        [second.north[target], second.east[target]]
+    )
     sine *= sine
     with np.errstate(divide="ignore", invalid="ignore"):
         np.divide(wanted, sine, out=wanted)

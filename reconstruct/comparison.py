@@ -4,6 +4,7 @@ Mast first: the fit is mast = slope · lidar, and a residual is mast - slope · 
 2015, Tables 10 and 11). Bias, where it stands, is lidar - mast.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -140,7 +141,8 @@ def fit_direction_plainly(mast_deg: ArrayLike, lidar_deg: ArrayLike) -> Directio
     return _line(mast, lidar, mast, lidar)
 
 
-class ByDirection(NamedTuple):
+@dataclass(frozen=True)
+class ByDirection:
     """Residuals sorted by where the wind comes from: a turbine's wake shows as a dent."""
 
     from_deg: FloatArray  # (bin,) middles
@@ -182,7 +184,8 @@ def residual_by_direction(from_deg: ArrayLike, residual: ArrayLike, *, bin_deg: 
     for number in np.unique(place):
         cut[:, number] = np.quantile(values[place == number], [0.25, 0.5, 0.75])
     middles = (np.arange(bins) + 0.5) * bin_deg
-    return ByDirection(middles, np.bincount(place, minlength=bins).astype(np.intp), cut[1], cut[0], cut[2])
+    counts = np.bincount(place, minlength=bins).astype(np.intp)
+    return ByDirection(np.asarray(middles, dtype=float), counts, cut[1], cut[0], cut[2])
 
 
 class WeibullFit(NamedTuple):

@@ -34,7 +34,7 @@ SOME_RAYS = 2000  # give a median to 3 % of the scatter
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 CANDIDATES = 41  # centres tried side by side in each direction
-REFINEMENTS = 4
+REFINEMENTS = 3
 WIDE_STDS = 6.0  # half width of the next look, in standard deviations of the last one
 
 
@@ -203,18 +203,26 @@ def _centres(
     cnr_map: CnrMap, image: _Image, shape: Shape, look: Look, fit: _Fit, weight: FloatArray
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Centre and standard deviation across and up, with what target and beam may really be."""
-    others = (
-        look._replace(width_deg=look.width_deg * (1.0 + SIZE_SHARE)),
-        Look(look.width_deg, *(beam * (1.0 + BEAM_SHARE) for beam in look[1:])),
-    )
-    places = [fit.across_deg, fit.up_deg]
+    shares_off = ((SIZE_SHARE, 0.0), (-SIZE_SHARE, 0.0), (0.0, BEAM_SHARE), (0.0, -BEAM_SHARE))
+    others = [
+        Look(look.width_deg * (1.0 + size), *(beam * (1.0 + wider) for beam in look[1:]))
+        for size, wider in shares_off
+    ]
+    places = [_roomy(fit, axis, cnr_map.step_deg[axis]) for axis in (0, 1)]
     tried = [_likelihood(image.power, weight, shape, other, *cnr_map.aside_deg, places) for other in others]
     found = []
     for axis in (0, 1):
         mean, std = _moments(fit, axis)
-        moved = [_moments(other, axis)[0] - mean for other in tried]
-        found.append((mean, float(np.hypot(std, np.linalg.norm(moved)))))
+        moved = [abs(_moments(other, axis)[0] - mean) for other in tried]
+        found.append((mean, float(np.linalg.norm((std, max(moved[:2]), max(moved[2:]))))))
     return found[0], found[1]
+
+
+def _roomy(fit: _Fit, axis: int, step: float) -> FloatArray:
+    """Centres to try where the target may look a little different: a step to each side at least."""
+    mean, std = _moments(fit, axis)
+    half = max(WIDE_STDS * std, step)
+    return np.linspace(mean - half, mean + half, CANDIDATES)
 
 
 def _fitted(cnr_map: CnrMap, image: _Image, shape: Shape, look: Look) -> tuple[_Fit, FloatArray]:

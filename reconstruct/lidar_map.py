@@ -111,7 +111,9 @@ def _pair_chunk(
     speed = points[3]
     with np.errstate(invalid="ignore", divide="ignore"):
         views = [beam_view(head, points, wind) for head in heads]
-        noise = np.stack([radial_variance_m2s2(view, source) for view, source in zip(views, sources, strict=True)])
+        noise = np.stack(
+            [radial_variance_m2s2(view, source) for view, source in zip(views, sources, strict=True)]
+        )
     rows = np.array([[view.east for view in views], [view.north for view in views]])
     root = np.isfinite(rows[0]).astype(float)
     if not np.all(root):  # a target at a lidar, or right above it

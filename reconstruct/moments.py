@@ -37,7 +37,7 @@ class WindMoments(NamedTuple):
     speed_bias_mps: FloatArray
     speed_std_mps: FloatArray
     direction_bias_deg: FloatArray  # circular mean of the difference; NaN in a calm, or drowned by the error
-    direction_std_deg: FloatArray  # root mean square of the wrapped difference from that mean; NaN as the mean
+    direction_std_deg: FloatArray  # root mean square of the wrapped difference from that mean; NaN likewise
 
 
 def wind_moments(

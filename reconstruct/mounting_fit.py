@@ -21,11 +21,11 @@ ANGLES: tuple[Angle, ...] = ("azimuth_offset_deg", "elevation_offset_deg", "pitc
 # Singular values under this share of the largest: what is solved for cannot be told apart at all.
 RANK_SHARE = 1e-6
 
-# An angle is as good as undetermined where the targets tell it five times worse than each of them is measured
-# AND worse than a level on the tripod does (0.03°, the default of the site file). Three targets in a line with
-# the lidar tell the tilt across that line only by 1/tan(elevation): 19 times worse at 3°.
-WEAKENING = 5.0
-LEVEL_DEG = 0.03
+# An angle counts as undetermined where it comes out four times worse than the best target is measured: every
+# error of a map or a survey would be that much larger in it. Three targets in a line with the lidar tell the
+# tilt across that line by their azimuths alone, 10 times worse at 3° elevation and 4 at 8°; targets at 0, 30
+# and 60° reach 7, at 0, 45 and 90° 3, all around 0.8.
+WEAKENING = 4.0
 
 OUTLIER_CHANCE = 1e-3  # residuals that good data have less often than this are called an outlier's
 SIGNIFICANT_CHANCE = 0.05  # two-sided
@@ -296,8 +296,8 @@ def undetermined(
         return solve
     stds = predicted_std_deg(sightings, start=start, solve=solve, head_std_m=head_std_m)
     factor = _whitening(sightings, list(range(len(sightings))), head_std_m)[1]
-    measured_deg = float(np.median(np.linalg.norm(factor, axis=1)))
-    limit_deg = max(WEAKENING * measured_deg, LEVEL_DEG)
+    measured_deg = float(np.linalg.norm(factor, axis=1).min())
+    limit_deg = WEAKENING * measured_deg
     return tuple(angle for angle, std in zip(solve, stds, strict=True) if not std <= limit_deg)
 
 

@@ -32,7 +32,12 @@ class RaySeries(NamedTuple):
 
     def at(self, index: IntArray | NDArray[np.bool_]) -> "RaySeries":
         """Some of the rays."""
-        return RaySeries(*(values[index] for values in self))
+        return RaySeries(
+            self.time_utc[index],
+            self.azimuth_deg[index],
+            self.elevation_deg[index],
+            self.radial_speed_mps[index],
+        )
 
 
 class Pairs(NamedTuple):

@@ -55,7 +55,9 @@ class Rays:
     probes: tuple[Probe, ...]  # one for each lidar
     period_s: float  # from the start of one scan to the start of the next
     back_and_forth: bool = False  # every second scan runs through the same azimuths in reverse
-    sweep_s: float | None = None  # from the start of the whole pass to its end, rays left out included; default: these rays'
+    sweep_s: float | None = (
+        None  # of the whole pass, start to end, rays left out included; default: these rays
+    )
 
     def __post_init__(self) -> None:
         shapes = {name: np.shape(getattr(self, name))[:1] for name in (*_FLOATS, "lidar")}

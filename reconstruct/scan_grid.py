@@ -14,6 +14,7 @@ from reconstruct.records import Records
 
 TimeArray = NDArray[np.datetime64]
 
+LOOKED_AT = 3000  # rays that show where the fan is
 SHARED_GEOMETRY_DEG = 0.005  # rays that differ less from scan to scan share one fit: 0.1 m at 1 km
 
 
@@ -77,9 +78,8 @@ def scan_grid(records: Records, planned_azimuth_deg: FloatArray, *, step_deg: fl
     Returns
     -------
     Gridded
-        The whole fan is moved onto the measured azimuths first, by at most half a step. Rays that are then
-        further than half a step from every column, and second rays in a column of one pass, are counted as
-        lost.
+        The whole fan is moved first to where most of the rays are. Rays that are then further than half a step
+        from every column, and second rays in a column of one pass, are counted as lost.
 
     Raises
     ------
@@ -133,8 +133,13 @@ def _columns(azimuth_deg: FloatArray, planned_deg: FloatArray, step_deg: float) 
     """Column of each ray, -1 where none is near, and how far the fan was moved [deg]."""
     if not len(azimuth_deg):
         return np.empty(0, dtype=np.intp), 0.0
-    nearest, off = _nearest(azimuth_deg, planned_deg)
-    offset = float(np.median(off))
+    sample = azimuth_deg[:: max(len(azimuth_deg) // LOOKED_AT, 1)]
+    fine = float(np.median(_nearest(sample, planned_deg)[1]))
+    fine -= step_deg * round(fine / step_deg)
+    shifts = fine + step_deg * np.arange(-len(planned_deg), len(planned_deg) + 1)
+    shifts = shifts[np.argsort(np.abs(shifts), kind="stable")]  # of two as good the smaller
+    counts = [np.count_nonzero(np.abs(_nearest(sample, planned_deg + shift)[1]) <= 0.5 * step_deg) for shift in shifts]
+    offset = float(shifts[int(np.argmax(counts))])
     nearest, off = _nearest(azimuth_deg, planned_deg + offset)
     return np.where(np.abs(off) <= 0.5 * step_deg, nearest, -1), offset
 

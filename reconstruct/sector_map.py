@@ -69,7 +69,9 @@ def sector_variance(
     heads = np.asarray(heads_m, dtype=float).reshape(-1, 3)
     target, offsets = np.asarray(target_m, dtype=float), np.asarray(offsets_deg, dtype=float)
     states = condensed(climate, like, criterion)
-    noise = np.broadcast_to(np.asarray(sources.radial_speed_mps if noise_mps is None else noise_mps, float), len(heads))
+    noise = np.broadcast_to(
+        np.asarray(sources.radial_speed_mps if noise_mps is None else noise_mps, float), len(heads)
+    )
     out = np.empty(len(heads))
     step = max(CHUNK // len(offsets), 1)
     for start in range(0, len(heads), step):
@@ -110,7 +112,7 @@ def _variance(
         if criterion != "speed":
             scale = 1.0 if criterion == "vector" else np.degrees(1.0 / speed) ** 2
             total += weight * scale * _projected(np.tensordot(across, fit, 1), view, sources, noise_mps)
-    return total
+    return np.asarray(total)
 
 
 def _projected(
@@ -135,5 +137,4 @@ def _projected(
             carried = gain_row * response
             total += std**2 * (1.0 - correlation) * np.einsum("rc,rc->c", carried, carried)
             total += std**2 * correlation * np.square(carried.sum(axis=0))
-    return total
-
+    return np.asarray(total)

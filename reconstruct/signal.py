@@ -64,7 +64,7 @@ def cnr_db(
     distance = np.asarray(range_m, dtype=np.float64)
     if not np.all(distance > 0) or reference_range_m <= 0 or pulse_ratio <= 0:
         raise InputError(
-            f"range {range_m} m, reference {reference_range_m} m, pulse ratio {pulse_ratio}: all above 0"
+            f"range {distance} m, reference {reference_range_m} m, pulse ratio {pulse_ratio}: all above 0"
         )
     spread = -20.0 * np.log10(distance / reference_range_m)
     absorbed = -2.0 * DB_PER_NEPER * extinction_per_m * (distance - reference_range_m)

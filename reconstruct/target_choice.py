@@ -67,7 +67,7 @@ def best_targets(
     >>> def at(name, azimuth_deg, range_m):
     ...     there = range_m * unit_vector(azimuth_deg, 3.0)
     ...     return Sighting(name, there, azimuth_deg, 3.0, range_m, .003, .003, .1, .2)
-    >>> near = [at("a", 0.0, 900.0), at("b", 10.0, 900.0), at("c", 125.0, 900.0), at("d", 240.0, 900.0)]
+    >>> near = [at("a", 0.0, 900.0), at("b", 60.0, 900.0), at("c", 120.0, 900.0), at("d", 240.0, 900.0)]
     >>> best_targets(near).names
     ('a', 'c', 'd')
     """

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct.error_draws import Draws, draw_pointing, draw_speed_errors
 from reconstruct.field import Field, synthesise
@@ -25,6 +25,8 @@ from reconstruct.wind import WindState, uv_mps
 
 PERIODS_PER_FIELD = 4  # share a field, at heights of it that have little in common
 REFERENCE_INTERVAL_S = 1.0
+FAN_KNOTS = 7  # rays of a fan that the small eddies are worked out for: every 10° of 60°
+FAN_ELEVATION_DEG = 3.0  # a fan is about level
 _CORRELATED = (
     ("radial_speed_mps", "radial_speed_correlation"),
     ("azimuth_deg", "azimuth_correlation"),
@@ -50,7 +52,8 @@ class VirtualScan:
         return replace(state, speed_mps=state.speed_mps * self.speed_ratio, height_m=self.height_m)
 
 
-class Flown(NamedTuple):
+@dataclass(frozen=True)
+class Flown:
     """What the instruments measure in one averaging period."""
 
     index: int
@@ -220,10 +223,30 @@ def _radial_speeds(
         shift_m=air.shift_m + to_wind_frame(scan.offset_m, state.from_deg),
     )
     if air.field is not None and air.turbulence is not None:
-        root = subgrid_root(rays, wind, air.turbulence, air.field.cut_per_m)
-        clean += std * rng.standard_normal(clean.shape) @ root.T
+        small = subgrid_std(rays, wind, air.turbulence, air.field.cut_per_m)
+        clean += std * small * rng.standard_normal(clean.shape)
     noise, _ = draw_speed_errors(sources, rays, shape, rng)
     return np.asarray(clean * lasting.factor + lasting.speed_mps + noise[0])
+
+
+def subgrid_std(rays: Rays, wind: WindState, turbulence: Turbulence, cut_per_m: float) -> FloatArray:
+    """(ray,) standard deviation of what eddies beyond a wavenumber add to the rays of one lidar.
+
+    For a longitudinal variance of 1. Along a fan it changes slowly: some rays are worked out
+    (`flight.subgrid_root`) and the others lie between them.
+    """
+    if rays.count <= FAN_KNOTS or np.ptp(rays.elevation_deg) > FAN_ELEVATION_DEG:
+        return np.sqrt(np.sum(np.square(subgrid_root(rays, wind, turbulence, cut_per_m)), axis=1))
+    knots = np.unique(np.linspace(0, rays.count - 1, FAN_KNOTS).round().astype(np.intp))
+    some = subgrid_root(rays_at(rays, knots), wind, turbulence, cut_per_m)
+    variance = np.interp(np.arange(rays.count), knots, np.sum(np.square(some), axis=1))
+    return np.asarray(np.sqrt(variance))
+
+
+def rays_at(rays: Rays, index: IntArray) -> Rays:
+    """Some rays of a scan, with its timing."""
+    per_ray = ("azimuth_deg", "elevation_deg", "range_m", "head_m", "lidar", "time_s", "duration_s", "swept_azimuth_deg")
+    return replace(rays, **{name: getattr(rays, name)[index] for name in per_ray})
 
 
 def _reference(state: WindState, air: _Air, averaging_s: float, rng: np.random.Generator) -> FloatArray:
@@ -233,7 +256,9 @@ def _reference(state: WindState, air: _Air, averaging_s: float, rng: np.random.G
         return np.tile(state.uv_mps, (len(times), 1))
     std = air.turbulence.std_mps(state.speed_mps)
     met = reference_mps(state, times, field=air.field, std_mps=std, shift_m=air.shift_m)
-    met = met + std * rng.multivariate_normal(np.zeros(3), air.field.subgrid, size=len(times), method="cholesky")
+    met = met + std * rng.multivariate_normal(
+        np.zeros(3), air.field.subgrid, size=len(times), method="cholesky"
+    )
     downwind = np.stack(uv_mps(1.0, state.from_deg))
     left = np.array([-downwind[1], downwind[0]])
     return np.asarray(met[:, :1] * downwind + met[:, 1:2] * left)

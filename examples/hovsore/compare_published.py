@@ -170,8 +170,10 @@ def sensitivities() -> dict[str, tuple[SpeedRegression, DirectionRegression]]:
     }
 
 
-def draw(path: Path) -> None:
-    """Draw slope and residual scatter against sector size: curves predicted, points published."""
+def draw(path: Path, curves: dict[str, tuple[SpeedRegression, DirectionRegression]]) -> None:
+    """Draw slope and residual scatter against sector size: curves predicted (see `settings`), points
+    published.
+    """
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -179,7 +181,7 @@ def draw(path: Path) -> None:
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2), layout="constrained")
     looks = (("#0b5394", "-", 2.0), ("#cc6600", "--", 1.4), ("#555555", ":", 1.6))
-    for (name, (speed, _)), (colour, dash, width) in zip(settings().items(), looks, strict=True):
+    for (name, (speed, _)), (colour, dash, width) in zip(curves.items(), looks, strict=True):
         look = {
             "color": colour,
             "linestyle": dash,
@@ -192,7 +194,7 @@ def draw(path: Path) -> None:
     left.plot(*_sides(PUBLISHED_SLOPE), marker="o", label="published", **point)
     left.plot(*_sides(STATED_SLOPE), marker="o", markerfacecolor="none", label="published in words", **point)
     sizes, residual = (np.array(side) for side in _sides(PUBLISHED_RESIDUAL_MPS))
-    ends = np.sqrt(residual**2 + RESIDUAL_ROUNDING_M2S2 * np.array([[-1.0], [1.0]]))
+    ends = np.sqrt(np.round(residual**2, 1) + RESIDUAL_ROUNDING_M2S2 * np.array([[-1.0], [1.0]]))
     right.errorbar(
         sizes,
         residual,
@@ -227,4 +229,4 @@ def _sides(values: dict[int, float]) -> tuple[list[int], list[float]]:
 if __name__ == "__main__":
     main()
     if len(sys.argv) > 1:
-        draw(Path(sys.argv[1]))
+        draw(Path(sys.argv[1]), settings())

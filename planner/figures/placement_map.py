@@ -35,23 +35,30 @@ def error_map(found: Placement) -> bytes:
         axes = figure.add_subplot()
         _frame(axes, found)
         _hindered(axes, found)
-        least = float(np.nanmin(error[np.isfinite(error)]))
         kept = np.where(np.isfinite(error), error, np.nan)
+        least, most = float(np.nanmin(kept)), float(np.nanmax(kept))
+        top = min(SCALE_TOP * least, most)
         shown = axes.pcolormesh(
-            *_middle(found), kept, cmap=COLOURS, vmin=least, vmax=SCALE_TOP * least, shading="nearest", rasterized=True
+            *_middle(found),
+            kept,
+            cmap=COLOURS,
+            vmin=least,
+            vmax=top,
+            shading="nearest",
+            rasterized=True,
         )
-        extend = "max" if np.nanmax(kept) > SCALE_TOP * least else "neither"
+        extend = "max" if most > top else "neither"
         bar = figure.colorbar(shown, ax=axes, shrink=0.8, extend=extend)
         bar.set_label(BAR_LABEL[found.task.criterion], color=INK)
         _things(axes, found)
         axes.set_title(_title(found), parse_math=False)
-        _legend(figure, axes)
+        _legend(figure, axes, flat=bool(np.any(np.isnan(kept.ravel()) & found.seen.allowed.all(axis=0))))
         return image(figure)
 
 
 def criteria_maps(found: Placement) -> bytes:
     """Draw one small map for each criterion that hinders anywhere: what is left over of it, as a PNG."""
-    slack = {name: values for name, values in least_slack(found.seen).items() if not np.all(values >= 0.0)}
+    slack = {name: values for name, values in least_slack(found.seen).items() if np.any(values < 0.0)}
     names = list(slack) or ["range-max"]
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
@@ -68,17 +75,34 @@ def criteria_maps(found: Placement) -> bytes:
 def _criterion(figure: "Figure", axes: "Axes", found: Placement, name: str, slack: FloatArray) -> None:
     unit, meaning = CRITERIA[name]
     values = np.where(np.isfinite(slack), slack, np.nan).reshape(found.grid.shape)
-    top = float(np.nanmax(np.abs(values), initial=1e-9))
-    shown = axes.pcolormesh(*_middle(found), values, cmap="RdYlBu", vmin=-top, vmax=top, shading="nearest", rasterized=True)
+    least = float(np.nanmin(values))
+    top = -least if least < 0.0 else float(np.nanmax(values, initial=1e-9))
+    shown = axes.pcolormesh(
+        *_middle(found), values, cmap="RdYlBu", vmin=-top, vmax=top, shading="nearest", rasterized=True
+    )
     if np.nanmin(values) < 0.0 < np.nanmax(values):
         axes.contour(*_middle(found), values, levels=[0.0], colors=[INK], linewidths=1.0)
-    figure.colorbar(shown, ax=axes, shrink=0.75, location="bottom", label=f"left over [{unit}]; red: not allowed")
+    extend = "max" if np.nanmax(values) > top else "neither"
+    figure.colorbar(
+        shown,
+        ax=axes,
+        extend=extend,
+        shrink=0.75,
+        location="bottom",
+        label=f"left over [{unit}]; red: not allowed",
+    )
     axes.set_title(meaning, fontsize=9, wrap=True)
     axes.set_aspect("equal")
     axes.set_xticks([])
     axes.set_yticks([])
     for target in found.task.targets_m:
-        axes.plot(*_from_middle(found, target[None])[0], marker="*", color=CROSSING, markersize=8, markeredgecolor=PAPER)
+        axes.plot(
+            *_from_middle(found, target[None])[0],
+            marker="*",
+            color=CROSSING,
+            markersize=8,
+            markeredgecolor=PAPER,
+        )
 
 
 def _title(found: Placement) -> str:
@@ -134,30 +158,66 @@ def _things(axes: "Axes", found: Placement) -> None:
     site, task = found.task.site, found.task
     if site.turbines:
         points = _from_middle(found, np.array([turbine.position for turbine in site.turbines]))
-        axes.plot(*points.T, "o", color=PAPER, markeredgecolor=TURBINE, markeredgewidth=1.5, markersize=7, label="turbine")
+        axes.plot(
+            *points.T,
+            "o",
+            color=PAPER,
+            markeredgecolor=TURBINE,
+            markeredgewidth=1.5,
+            markersize=7,
+            label="turbine",
+        )
     if site.masts:
         points = _from_middle(found, np.array([mast.position for mast in site.masts]))
         axes.plot(*points.T, "^", color=MAST, markeredgecolor=PAPER, markersize=9, label="mast")
     targets = _from_middle(found, task.targets_m)
-    axes.plot(*targets.T, "*", color=PAPER, markeredgecolor=CROSSING, markersize=11, linestyle="none", label="target")
+    axes.plot(
+        *targets.T,
+        "*",
+        color=PAPER,
+        markeredgecolor=CROSSING,
+        markersize=11,
+        linestyle="none",
+        label="target",
+    )
     for lidar in task.fixed:
         index = site.lidars.index(lidar)
         here = _from_middle(found, np.array([lidar.position]))[0]
-        axes.plot(*here, "D", color=lidar_colour(index), markeredgecolor=PAPER, markersize=9, linestyle="none")
-        axes.plot([here[0], targets[0, 0]], [here[1], targets[0, 1]], color=lidar_colour(index), linewidth=1.5)
+        axes.plot(
+            *here, "D", color=lidar_colour(index), markeredgecolor=PAPER, markersize=9, linestyle="none"
+        )
+        axes.plot(
+            [here[0], targets[0, 0]], [here[1], targets[0, 1]], color=lidar_colour(index), linewidth=1.5
+        )
         _name(axes, lidar.name, here)
     _ranked(axes, found, targets[0])
 
 
 def _ranked(axes: "Axes", found: Placement, target: FloatArray) -> None:
     if found.declared is not None:
-        for lidar, here in zip(found.task.replaced, _from_middle(found, found.declared.positions_m), strict=True):
-            axes.plot(*here, "D", color=PAPER, markeredgecolor=EXCLUDED, markeredgewidth=1.8, markersize=8, linestyle="none")
+        for lidar, here in zip(
+            found.task.replaced, _from_middle(found, found.declared.positions_m), strict=True
+        ):
+            axes.plot(
+                *here,
+                "D",
+                color=PAPER,
+                markeredgecolor=EXCLUDED,
+                markeredgewidth=1.8,
+                markersize=8,
+                linestyle="none",
+            )
             _name(axes, f"{lidar.name} as declared", here)
     for item in reversed(found.ranked):
         best = item.rank == 1
         for here in _from_middle(found, item.positions_m):
-            axes.plot(*here, "D", color=EXCLUDED if best else PAPER, markeredgecolor=PAPER if best else INK_SOFT, markersize=10 if best else 7)
+            axes.plot(
+                *here,
+                "D",
+                color=EXCLUDED if best else PAPER,
+                markeredgecolor=PAPER if best else INK_SOFT,
+                markersize=10 if best else 7,
+            )
             if best:
                 axes.plot([here[0], target[0]], [here[1], target[1]], color=EXCLUDED, linewidth=1.5)
             _name(axes, f"{item.rank}", here)
@@ -169,16 +229,49 @@ def _name(axes: "Axes", text: str, here: FloatArray) -> None:
     low, high = axes.get_xlim()
     right = here[0] > low + 0.75 * (high - low)
     axes.annotate(
-        text, tuple(here), xytext=(-9 if right else 9, 6), textcoords="offset points", ha="right" if right else "left",
-        fontsize=9, color=INK, parse_math=False, path_effects=[withStroke(linewidth=2.5, foreground=PAPER)], zorder=9,
+        text,
+        tuple(here),
+        xytext=(-9 if right else 9, 6),
+        textcoords="offset points",
+        ha="right" if right else "left",
+        fontsize=9,
+        color=INK,
+        parse_math=False,
+        path_effects=[withStroke(linewidth=2.5, foreground=PAPER)],
+        zorder=9,
     )
 
 
-def _legend(figure: "Figure", axes: "Axes") -> None:
-    axes.plot([], [], "D", color=EXCLUDED, markeredgecolor=PAPER, markersize=10, linestyle="none", label="best place")
-    axes.plot([], [], "D", color=PAPER, markeredgecolor=INK_SOFT, markersize=7, linestyle="none", label="next best, by rank")
-    if not found.task.single:
-        axes.plot([], [], "s", color=PAPER, markeredgecolor=INK_SOFT, markersize=9, linestyle="none", label="beams cross too flat")
+def _legend(figure: "Figure", axes: "Axes", *, flat: bool) -> None:
+    axes.plot(
+        [],
+        [],
+        "D",
+        color=EXCLUDED,
+        markeredgecolor=PAPER,
+        markersize=10,
+        linestyle="none",
+        label="best place",
+    )
+    axes.plot(
+        [],
+        [],
+        "D",
+        color=PAPER,
+        markeredgecolor=INK_SOFT,
+        markersize=7,
+        linestyle="none",
+        label="next best, by rank",
+    )
+    if flat:
+        axes.plot(
+            [],
+            [],
+            "s",
+            color=PAPER,
+            markeredgecolor=INK_SOFT,
+            markersize=9,
+            linestyle="none",
+            label="beams cross too flat",
+        )
     figure.legend(loc="outside lower left", ncols=4)
-
-

@@ -92,10 +92,20 @@ def write_geotiff(
     """
     rasterio = _rasterio("a GeoTIFF")
     east, north = abs(float(east_m[1] - east_m[0])), abs(float(north_m[1] - north_m[0]))
-    transform = rasterio.Affine(east, 0.0, float(east_m[0]) - east / 2, 0.0, -north, float(north_m[0]) + north / 2)
+    transform = rasterio.Affine(
+        east, 0.0, float(east_m[0]) - east / 2, 0.0, -north, float(north_m[0]) + north / 2
+    )
     shape = next(iter(layers.values())).shape
-    profile = {"driver": "GTiff", "height": shape[0], "width": shape[1], "count": len(layers), "dtype": "float32"}
-    with rasterio.open(path, "w", crs=crs, transform=transform, nodata=np.nan, compress="deflate", **profile) as file:
+    profile = {
+        "driver": "GTiff",
+        "height": shape[0],
+        "width": shape[1],
+        "count": len(layers),
+        "dtype": "float32",
+    }
+    with rasterio.open(
+        path, "w", crs=crs, transform=transform, nodata=np.nan, compress="deflate", **profile
+    ) as file:
         for band, (name, values) in enumerate(layers.items(), start=1):
             file.write(values.astype(np.float32), band)
             file.set_band_description(band, name)
@@ -105,7 +115,9 @@ def _rasterio(what: str) -> ModuleType:
     try:
         import rasterio
     except ImportError:
-        raise UnavailableError(f"{what} needs rasterio, which is not installed: pip install 'lidarplan[terrain]'") from None
+        raise UnavailableError(
+            f"{what} needs rasterio, which is not installed: pip install 'lidarplan[terrain]'"
+        ) from None
     module: ModuleType = rasterio
     return module
 
@@ -137,7 +149,9 @@ def _datum(file: Path, own: Any, declared: HeightDatum | None) -> HeightDatum:
     from pyproj import CRS
 
     full = CRS.from_user_input(own.to_wkt())
-    vertical = next((part for part in full.sub_crs_list if part.is_vertical), None) if full.is_compound else None
+    vertical = (
+        next((part for part in full.sub_crs_list if part.is_vertical), None) if full.is_compound else None
+    )
     said: HeightDatum | None = None
     if vertical is not None:
         said = "ellipsoidal" if "ellips" in vertical.name.lower() else "above_sea_level"
@@ -163,7 +177,9 @@ def _warped(heights: FloatArray, transform: Any, own: Any, crs: str) -> tuple[Fl
     """Heights on square cells of the site's CRS, bilinear, and their transform; NaN where the raster does not reach."""
     from pyproj import CRS, Transformer
 
-    source = HeightRaster.from_transform(heights, tuple(transform)[:6], "above_sea_level")  # the datum is not looked at
+    source = HeightRaster.from_transform(
+        heights, tuple(transform)[:6], "above_sea_level"
+    )  # the datum is not looked at
     full = CRS.from_user_input(own.to_wkt())
     flat = full.sub_crs_list[0] if full.is_compound else full
     there = Transformer.from_crs(flat, crs, always_xy=True)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from geometry.errors import InputError
+from geometry.gates import Gates
 from planner.handover.head_path import HeadPath
 from planner.instruments import Head
 from planner.scan_layout import ScanLayout
@@ -32,8 +33,8 @@ def require_accumulation(layout: ScanLayout, step_s: float, why: str) -> int:
     return round(steps)
 
 
-def require_gates(layout: ScanLayout, most: int, what: str) -> None:
-    """Check that a scan has gates, and no more than a file or the instrument takes.
+def require_gates(layout: ScanLayout, most: int, what: str) -> Gates:
+    """Give a scan's gates: it must have some, and no more than a file or the instrument takes.
 
     Raises
     ------
@@ -51,6 +52,7 @@ def require_gates(layout: ScanLayout, most: int, what: str) -> None:
             f"scan '{layout.name}': {layout.gates.count} gates came; {what} takes {limit} at most. "
             "Make the spacing wider or the stretch shorter."
         )
+    return layout.gates
 
 
 def require_range(layout: ScanLayout) -> None:

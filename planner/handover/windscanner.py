@@ -37,6 +37,8 @@ FFT_POINTS = (64, 128, 256)
 
 PROGRAM = 1983
 STOP = "P1001!=-78"
+START_DEG_PER_S = 5
+START_RAMP_MS = 500
 SETTLE_MS = 1  # at rest before the triggers begin; the dwell also keeps the controller from reading on
 
 LINE_END = "\r\n"
@@ -87,14 +89,12 @@ def range_gate_table(layout: ScanLayout) -> str:
     InputError
         If gates, pulse, FFT or accumulation are not the instrument's.
     """
-    require_gates(layout, MOST_GATES, "a range-gate table")
+    centres = require_gates(layout, MOST_GATES, "a range-gate table").centres_m
     require_range(layout)
     accumulation_ms = 100 * require_accumulation(
         layout, ACCUMULATION_STEP_S, "accumulation of the WindScanner"
     )
     pulse_ns, fft_points = _pulse(layout)
-    assert layout.gates is not None  # noqa: S101 - require_gates
-    centres = layout.gates.centres_m
     whole = np.round(centres)
     if np.abs(centres - whole).max() > 1e-6:
         raise InputError(
@@ -145,6 +145,7 @@ def motion_program(layout: ScanLayout) -> str:
         "LINEAR",
         "ABS",
         f"I322={pulses_per_ms:g}",
+        *_start(one_round[-1].end_deg),
         f"WHILE({STOP})",
     ]
     here = one_round[-1].end_deg
@@ -152,6 +153,11 @@ def motion_program(layout: ScanLayout) -> str:
         lines += _sweep_lines(layout, sweep, here, head, pulses_per_ms)
         here = sweep.end_deg
     return "".join(f"{line}{LINE_END}" for line in (*lines, "ENDWHILE", 'CMD"#3j/"', "CLOSE"))
+
+
+def _start(at_deg: FloatArray) -> list[str]:
+    """Slowly to where a round ends, from wherever the head is."""
+    return [f"TA({START_RAMP_MS})F({START_DEG_PER_S})", _target(at_deg), f"DWELL{SETTLE_MS}"]
 
 
 def _sweep_lines(
@@ -207,6 +213,11 @@ def _wait(time_ms: float) -> list[str]:
 
 def _round(layout: ScanLayout, path: HeadPath) -> list[Sweep]:
     """What is repeated for ever: a pass, with its way back where the scan goes back and forth."""
+    if getattr(layout.spec, "sweep", None) == "forward":
+        raise InputError(
+            f"scan '{layout.name}': sweep: forward came; a motion program has an end and a way back. "
+            "Take sweep: back_and_forth or reset."
+        )
     one_pass = sweeps(path)
     if sum(sweep.rays for sweep in one_pass) == 1:
         return one_pass

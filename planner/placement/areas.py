@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from planner.site import Area, Site
 
 if TYPE_CHECKING:
     from shapely import Geometry
+    from shapely.geometry.base import BaseGeometry
 
 
 def area_slack_m(site: Site, positions_m: FloatArray) -> FloatArray:
@@ -70,7 +71,7 @@ def distance_m(file: Path, crs: str, positions_m: FloatArray) -> FloatArray:
     return np.asarray(shapely.distance(points, shapely.union_all(_shapes(file, crs))))
 
 
-def _inside_m(area: "Geometry", points: FloatArray) -> FloatArray:
+def _inside_m(area: "Geometry", points: Any) -> FloatArray:
     """Distance to the edge of an area [m], positive inside."""
     import shapely
 
@@ -79,14 +80,15 @@ def _inside_m(area: "Geometry", points: FloatArray) -> FloatArray:
     return np.asarray(np.where(shapely.intersects(area, points), edge, -edge))
 
 
-def _union(areas: Sequence[Area], crs: str, kind: str) -> "Geometry":
+def _union(areas: Sequence[Area], crs: str, kind: str) -> "BaseGeometry":
     import shapely
 
     parts = [shape for area in areas for shape in _of_area(area, crs, kind)]
-    return shapely.union_all(parts)
+    joined: BaseGeometry = shapely.union_all(parts)
+    return joined
 
 
-def _of_area(area: Area, crs: str, kind: str) -> "list[Geometry]":
+def _of_area(area: Area, crs: str, kind: str) -> "list[BaseGeometry]":
     import shapely
 
     if area.polygon is not None:
@@ -106,14 +108,18 @@ def _of_area(area: Area, crs: str, kind: str) -> "list[Geometry]":
 
 
 @lru_cache(maxsize=16)
-def _shapes(file: Path, crs: str) -> "tuple[Geometry, ...]":
+def _shapes(file: Path, crs: str) -> "tuple[BaseGeometry, ...]":
     """What a GIS file holds, in the site's CRS."""
     import geopandas as gpd
 
     try:
         table = gpd.read_file(file)
     except Exception as error:  # pyogrio's errors share no base with OSError
-        raise InputError(f"{file} cannot be read as a GIS file ({error}); give GeoPackage, GeoJSON or Shapefile") from error
+        raise InputError(
+            f"{file} cannot be read as a GIS file ({error}); give GeoPackage, GeoJSON or Shapefile"
+        ) from error
     if table.crs is None:
-        raise InputError(f"{file} does not say in which CRS it is; give a file that does (a Shapefile needs its .prj)")
+        raise InputError(
+            f"{file} does not say in which CRS it is; give a file that does (a Shapefile needs its .prj)"
+        )
     return tuple(shape for shape in table.to_crs(crs).geometry if shape is not None and not shape.is_empty)

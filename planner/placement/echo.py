@@ -17,7 +17,9 @@ class Echo(NamedTuple):
     """What one ray is worth at each range."""
 
     noise_mps: FloatArray  # standard deviation of its radial speed
-    valid_share: FloatArray  # of rays that are strong enough; inf where the site does not say how strong the echo is
+    valid_share: (
+        FloatArray  # of rays that are strong enough; inf where the site does not say how strong the echo is
+    )
 
 
 def echo(lidar: Lidar, scan: ScanPlan | None, range_m: FloatArray) -> Echo:

@@ -44,7 +44,9 @@ class How(NamedTuple):
     progress: Progress | None = None  # called with the share that is done
 
 
-def run(work: Work, shared: Any, batches: Sequence[Batch], *, how: How | None = None, expected_s: float = 0.0) -> list[Any]:
+def run(
+    work: Work, shared: Any, batches: Sequence[Batch], *, how: How | None = None, expected_s: float = 0.0
+) -> list[Any]:
     """Work on all batches.
 
     Parameters
@@ -104,7 +106,9 @@ def _worked(
     return _in_processes(work, shared, batches, processes)
 
 
-def _in_processes(work: Work, shared: Any, batches: list[Batch], processes: int) -> Iterator[tuple[Batch, Any]]:
+def _in_processes(
+    work: Work, shared: Any, batches: list[Batch], processes: int
+) -> Iterator[tuple[Batch, Any]]:
     """Results as they come; when a worker dies its batches are handed out again."""
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from concurrent.futures.process import BrokenProcessPool
@@ -113,7 +117,10 @@ def _in_processes(work: Work, shared: Any, batches: list[Batch], processes: int)
     rest = list(batches)
     for attempt in range(RETRIES):
         with ProcessPoolExecutor(
-            min(processes, len(rest)), mp_context=get_context("spawn"), initializer=_receive, initargs=(shared,)
+            min(processes, len(rest)),
+            mp_context=get_context("spawn"),
+            initializer=_receive,
+            initargs=(shared,),
         ) as pool:
             futures = {pool.submit(_work_on_shared, work, batch): batch for batch in rest}
             try:
@@ -146,7 +153,7 @@ def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> 
             "--scheduler needs dask, which is not installed: pip install 'lidarplan[cluster]'"
         ) from None
     try:
-        client = Client(address, timeout=CONNECT_S)
+        client = Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise UnavailableError(
             f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler` and give its tcp:// address"
@@ -155,9 +162,10 @@ def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> 
         # not scattered: what is scattered to one worker dies with it
         sent = client.submit(_give, pickle.dumps(shared), pure=False, retries=RETRIES)
         futures = {
-            client.submit(_work_on_sent, work, sent, batch, retries=RETRIES, pure=False): batch for batch in batches
+            client.submit(_work_on_sent, work, sent, batch, retries=RETRIES, pure=False): batch
+            for batch in batches
         }
-        for future in as_completed(list(futures)):
+        for future in as_completed(list(futures)):  # type: ignore[no-untyped-call]
             yield futures[future], future.result()
 
 
@@ -182,7 +190,9 @@ def _load(path: Path | None, key: str) -> dict[Batch, Any]:
     try:
         found = pickle.loads(path.read_bytes())
     except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError) as error:
-        raise InputError(f"{path}: the progress file cannot be read ({error}); remove it to start anew") from error
+        raise InputError(
+            f"{path}: the progress file cannot be read ({error}); remove it to start anew"
+        ) from error
     return dict(found["done"]) if found["key"] == key else {}
 
 

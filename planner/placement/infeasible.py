@@ -97,7 +97,9 @@ def _line(task: Task, seen: Look, name: str, others: BoolArray, *, by_itself: bo
     best = int(np.argmax(per_place))
     target = task.targets[int(np.argmin(known[:, best]))]
     kept = "" if others.any() else ", and other constraints with it"
-    return f"{so}: it must give {_amount(name, -float(per_place[best]))} (target {target}){kept}: {HINTS[name]}"
+    return (
+        f"{so}: it must give {_amount(name, -float(per_place[best]))} (target {target}){kept}: {HINTS[name]}"
+    )
 
 
 def _meaning(name: str) -> str:

@@ -30,7 +30,9 @@ GRID = 100  # candidates along each side
 REACH_SHARE = 1.5  # of the farthest declared lidar's distance: half the side of the default grid
 DEFAULT_REACH_M = 3000.0
 FAR_M = 10_000.0  # the pointing part of a beam's margin grows with the range and is taken from here
-PROBE_STEP_DEG = 2.0  # beams this near to each other see the same wakes: the end of a 43 m probe moves by 0.4 m
+PROBE_STEP_DEG = (
+    2.0  # beams this near to each other see the same wakes: the end of a 43 m probe moves by 0.4 m
+)
 ARC_PLACES = 1000  # places that are worked on at once
 ARC_STEP_M = 30.0  # samples of an arc for wakes; their sectors, 30 degrees wide and more, overlap
 
@@ -83,19 +85,21 @@ class Look:
     azimuth_deg: FloatArray  # (target, place)
     elevation_deg: FloatArray  # (target, place)
     lost_share: FloatArray  # (target, place) of the wanted wind, to wakes
-    slack: Mapping[str, FloatArray]  # criterion to (target, place): how much is left over; negative: not allowed
+    slack: Mapping[
+        str, FloatArray
+    ]  # criterion to (target, place): how much is left over; negative: not allowed
 
     @property
     def allowed(self) -> BoolArray:
         """(target, place) where every criterion is kept; what is not known is not kept."""
-        return np.logical_and.reduce([values >= 0.0 for values in self.slack.values()])
+        return np.asarray(np.logical_and.reduce([values >= 0.0 for values in self.slack.values()]))
 
 
 def default_grid(task: Task, *, count: int = GRID, reach_m: float | None = None) -> Grid:
     """A grid over the allowed ground, else over a square around the targets.
 
     Half its side is 1.5 times the distance to the farthest declared lidar of the task, 3 km where there is none, and no
-    more than the farthest range; `reach_m` wins over all that.
+    more than the farthest range; `reach_m` wins over all that. What lies outside the terrain is left out.
     """
     bounds = allowed_bounds_m(task.site)
     if bounds is None:
@@ -106,6 +110,10 @@ def default_grid(task: Task, *, count: int = GRID, reach_m: float | None = None)
         reach = min(reach, task.limits.most_range_m) if reach_m is None else reach_m
         bounds = (*(low - reach), *(high + reach))
     west, south, east, north = bounds
+    if task.terrain is not None:
+        edges = task.terrain.bounds_m
+        west, south = max(west, edges[0]), max(south, edges[1])
+        east, north = min(east, edges[2]), min(north, edges[3])
     return Grid(np.linspace(west, east, count), np.linspace(north, south, count))
 
 
@@ -122,7 +130,9 @@ def standing_m(task: Task, places_m: ArrayLike) -> FloatArray:
 def look(task: Task, positions_m: FloatArray) -> Look:
     """Work out every criterion of heads at (place, 3) easting, northing, height [m]."""
     known = np.isfinite(positions_m[:, 2])
-    filled = np.where(known[:, None], positions_m, np.column_stack([positions_m[:, :2], 0.0 * positions_m[:, 0]]))
+    filled = np.where(
+        known[:, None], positions_m, np.column_stack([positions_m[:, :2], 0.0 * positions_m[:, 0]])
+    )
     local = task.places.local_m(filled)
     beam = beam_to(task.local_targets_m[:, None] - local)
     limits, shape = task.limits, beam.range_m.shape
@@ -169,8 +179,11 @@ def single_variance(task: Task, seen: Look) -> FloatArray:
             state,
             task.sources,
             criterion=task.criterion,
-            )
-        for target, climate, state in zip(task.local_targets_m, task.climates, task.states, strict=True)
+            noise_mps=noise,
+        )
+        for target, climate, state, noise in zip(
+            task.local_targets_m, task.climates, task.states, strong.noise_mps, strict=True
+        )
     ]
     return np.where(seen.allowed, np.stack(out), np.inf)
 
@@ -204,7 +217,10 @@ def _sight_slack_m(task: Task, local: FloatArray, range_m: FloatArray) -> FloatA
 
     A mast is only not to be touched: targets stand on masts. A sector has to be free at every ray.
     """
-    off = margin_m(task.pattern, 0.0) + (margin_m(task.pattern, FAR_M) - margin_m(task.pattern, 0.0)) * range_m / FAR_M
+    off = (
+        margin_m(task.pattern, 0.0)
+        + (margin_m(task.pattern, FAR_M) - margin_m(task.pattern, 0.0)) * range_m / FAR_M
+    )
     ends = _ends(task, local)
     slack = np.full(range_m.shape, np.inf)
     for part, solids in _solids(task):
@@ -236,7 +252,9 @@ def _solids(task: Task) -> list[tuple[str, Solids]]:
     if site.masts:
         bases = places.local_m([mast.position for mast in site.masts])
         tops = bases[:, 2] + [mast.height_m for mast in site.masts]
-        found.append(("mast", Cylinders(bases[:, :2], [m.width_m / 2 for m in site.masts], bases[:, 2], tops)))
+        found.append(
+            ("mast", Cylinders(bases[:, :2], [m.width_m / 2 for m in site.masts], bases[:, 2], tops))
+        )
     if site.obstacles:
         found.append(("obstacle", _boxes(task)))
     return found
@@ -281,7 +299,12 @@ def _lost_share(
     if not task.site.turbines:
         return np.zeros(azimuth_deg.shape)
     if task.single:
-        return np.stack([_lost_to_arcs(task, local, *beam) for beam in zip(azimuth_deg, elevation_deg, range_m, strict=True)])
+        return np.stack(
+            [
+                _lost_to_arcs(task, local, *beam)
+                for beam in zip(azimuth_deg, elevation_deg, range_m, strict=True)
+            ]
+        )
     ways = _lost_by_way(task)
     which = np.round(azimuth_deg / PROBE_STEP_DEG).astype(np.intp) % ways.shape[1]
     return np.asarray(np.take_along_axis(ways, which, axis=1))
@@ -315,7 +338,9 @@ def _lost_to_arcs(
     for start in range(0, len(local), ARC_PLACES):
         part = slice(start, start + ARC_PLACES)
         ranges = np.maximum(range_m[part, None] + half, 0.0)
-        points = point_at(azimuth_deg[part, None, None] + turns[:, None], elevation_deg[part, None, None], ranges[:, None])
+        points = point_at(
+            azimuth_deg[part, None, None] + turns[:, None], elevation_deg[part, None, None], ranges[:, None]
+        )
         samples = (local[part, None, None] + points).reshape(len(ranges), -1, 3)
         out[part] = _touched(task, samples) @ _direction_weight(task.site)
     return out
@@ -337,7 +362,7 @@ def _touched(task: Task, samples: FloatArray) -> FloatArray:
         )
         for model in models
     ]
-    return np.logical_or.reduce(found).astype(float)
+    return np.asarray(np.logical_or.reduce(found), dtype=np.float64)
 
 
 @lru_cache(maxsize=4)
@@ -347,5 +372,7 @@ def _direction_weight(site: Site) -> FloatArray:
     cells = [SectorSet.of([Sector((angle - 0.5) % 360.0, 1.0)]).intersection(wanted) for angle in range(BINS)]
     weight = np.array([share_within(site, cell) for cell in cells])
     if not weight.sum() > 0:
-        raise InputError("no wind comes from the wanted directions; give wind.directions_deg from which it blows")
-    return weight / weight.sum()
+        raise InputError(
+            "no wind comes from the wanted directions; give wind.directions_deg from which it blows"
+        )
+    return np.asarray(weight / weight.sum())

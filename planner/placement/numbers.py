@@ -7,16 +7,21 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.beams import beam_to
+from geometry.errors import InputError
 from planner.placement.echo import echo
 from planner.placement.maps import Look
 from planner.placement.task import Aggregate, Task
+from planner.scan_plans import SectorScan
 from planner.site import Lidar
-from planner.wind_climate import error_sources
+from planner.wind_climate import error_sources, turbulence
 from reconstruct.beam_table import Criterion, condensed
 from reconstruct.rays import Rays
 from reconstruct.retrieval import gain, rows
+from reconstruct.turbulent import predict_turbulent
 from reconstruct.uncertainty import ErrorSources, wind_covariance_by_source
 from reconstruct.wind import WindState
+
+DEFAULT_ACCUMULATION_S = 1.0  # of a lidar without a scan; it matters to turbulence alone
 
 
 class Numbers(NamedTuple):
@@ -33,7 +38,11 @@ class Numbers(NamedTuple):
 
     def value(self, criterion: Criterion, aggregate: Aggregate) -> float:
         """What a search minimises, at these places."""
-        each = {"vector": self.vector_std_mps, "speed": self.speed_std_mps, "direction": self.direction_std_deg}[criterion]
+        each = {
+            "vector": self.vector_std_mps,
+            "speed": self.speed_std_mps,
+            "direction": self.direction_std_deg,
+        }[criterion]
         return float(each.max() if aggregate == "worst" else np.sqrt(np.mean(each**2)))
 
 
@@ -54,7 +63,8 @@ def numbers_of(task: Task, looks: Sequence[Look]) -> Numbers:
     """
     lidars = [*task.fixed, *[task.pattern] * (len(looks) - len(task.fixed))]
     noise = [
-        echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[:, 0] for lidar, each in zip(lidars, looks, strict=True)
+        echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[:, 0]
+        for lidar, each in zip(lidars, looks, strict=True)
     ]
     heads = np.concatenate([each.local_m for each in looks])
     errors = [
@@ -80,17 +90,22 @@ def rays_at(task: Task, number: int, heads_m: FloatArray) -> Rays:
     beam = beam_to(-relative)
     offsets = task.offsets_deg if len(heads_m) == 1 else np.zeros(1)
     which = np.repeat(np.arange(len(heads_m)), offsets.size)
+    accumulation_s = task.scan.accumulation_s if task.scan else DEFAULT_ACCUMULATION_S
+    moving = len(heads_m) == 1 and isinstance(task.scan, SectorScan) and task.scan.motion == "continuous"
+    swept_deg = task.scan.step_deg if moving and isinstance(task.scan, SectorScan) else 0.0
     return Rays(
         azimuth_deg=beam.azimuth_deg[which] + np.tile(offsets, len(heads_m)),
         elevation_deg=beam.elevation_deg[which],
         range_m=beam.range_m[which],
         head_m=relative[which],
         lidar=which,
-        time_s=np.zeros(which.size),
-        duration_s=np.ones(which.size),
-        swept_azimuth_deg=np.zeros(which.size),
+        time_s=np.asarray(
+            (np.tile(np.arange(offsets.size), len(heads_m)) + 0.5) * accumulation_s, np.float64
+        ),
+        duration_s=np.full(which.size, accumulation_s),
+        swept_azimuth_deg=np.full(which.size, swept_deg),
         probes=(task.probe,) * len(heads_m),
-        period_s=1.0,
+        period_s=(task.scan.period_s if task.scan else None) or offsets.size * accumulation_s,
     )
 
 
@@ -104,8 +119,14 @@ def _errors(
     parts = np.array([_along_across(fit, rays, state, sources) for state in squares.states(like)])
     speed, side = squares.mean(parts[:, 0]), squares.mean(parts[:, 1])
     inverse = condensed(climate, like, "direction")
-    turned = [_along_across(fit, rays, state, sources)[1] / state.speed_mps**2 for state in inverse.states(like)]
-    return float(np.sqrt(speed)), float(np.degrees(np.sqrt(inverse.mean(turned)))), float(np.sqrt(speed + side))
+    turned = [
+        _along_across(fit, rays, state, sources)[1] / state.speed_mps**2 for state in inverse.states(like)
+    ]
+    return (
+        float(np.sqrt(speed)),
+        float(np.degrees(np.sqrt(inverse.mean(turned)))),
+        float(np.sqrt(speed + side)),
+    )
 
 
 def _along_across(
@@ -116,6 +137,50 @@ def _along_across(
     along = np.array(state.uv_mps) / state.speed_mps
     across = np.array([-along[1], along[0]])
     return float(along @ covariance @ along), float(across @ covariance @ across)
+
+
+def turbulent_numbers(task: Task, looks: Sequence[Look]) -> tuple[FloatArray, FloatArray]:
+    """Error of one retrieval with turbulence, by the turbulent tier.
+
+    Parameters
+    ----------
+    task, looks
+        As for `numbers_of`.
+
+    Returns
+    -------
+    tuple of FloatArray
+        Standard deviation of speed [m/s] and of direction [deg], (target,) each, over the climate.
+
+    Raises
+    ------
+    InputError
+        If the site does not give the turbulence of the air.
+    """
+    eddies = turbulence(task.site)
+    if eddies is None:
+        raise InputError(
+            "--tier turbulent needs the turbulence of the air, and the site does not give it: add wind.turbulence "
+            "{intensity, length_m}"
+        )
+    lidars = [*task.fixed, *[task.pattern] * (len(looks) - len(task.fixed))]
+    heads = np.concatenate([each.local_m for each in looks])
+    speed, direction = np.empty(len(task.targets)), np.empty(len(task.targets))
+    for number, (climate, like) in enumerate(zip(task.climates, task.states, strict=True)):
+        rays = rays_at(task, number, heads)
+        noise = [
+            float(echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[number, 0])
+            for lidar, each in zip(lidars, looks, strict=True)
+        ]
+        sources = [error_sources(lidar, mps) for lidar, mps in zip(lidars, noise, strict=True)]
+        found = [predict_turbulent(rays, state, eddies, sources) for state in climate.states(like)]
+        speed[number] = np.sqrt(climate.mean([_square(each.speed_std_mps) for each in found]))
+        direction[number] = np.sqrt(climate.mean([_square(each.direction_std_deg) for each in found]))
+    return speed, direction
+
+
+def _square(value: float | None) -> float:
+    return np.nan if value is None else value**2
 
 
 def _opening_deg(azimuth_deg: FloatArray) -> FloatArray:

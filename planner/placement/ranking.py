@@ -21,7 +21,7 @@ from planner.placement.maps import (
     standing_m,
     table_of,
 )
-from planner.placement.numbers import Numbers, numbers_of
+from planner.placement.numbers import Numbers, numbers_of, turbulent_numbers
 from planner.placement.refine import WORTH, Improve, SoftCost, binding, refined
 from planner.placement.task import Task
 from reconstruct.beam_table import BeamTable
@@ -40,7 +40,9 @@ class Ranked(NamedTuple):
     positions_m: FloatArray  # (lidar, 3) easting, northing, height of the head
     value: float  # what was minimised, in the criterion's unit, soft cost included
     numbers: Numbers
-    binds: tuple[str, ...]  # constraints that keep it from being better; of the declared places: that they break
+    binds: tuple[
+        str, ...
+    ]  # constraints that keep it from being better; of the declared places: that they break
     text: str
 
 
@@ -57,7 +59,9 @@ class Placement:
     why: str  # the best against the declared
 
 
-def place(task: Task, grid: Grid, *, how: How | None = None, cost: SoftCost | None = None, most: int = MOST) -> Placement:
+def place(
+    task: Task, grid: Grid, *, how: How | None = None, cost: SoftCost | None = None, most: int = MOST
+) -> Placement:
     """Find the best places.
 
     Parameters
@@ -144,13 +148,25 @@ def _searched(improve: Improve, seen: Look, how: How | None, most: int) -> tuple
     if not improve.fixed and not len(starts.members):
         return error, search.Sets(np.empty((0, task.count), dtype=np.intp), np.empty(0))
     sets = search.best_sets(
-        table, improve.fixed, members, count=task.count, cost=cost, least_opening_deg=opening, aggregate=task.aggregate
+        table,
+        improve.fixed,
+        members,
+        count=task.count,
+        cost=cost,
+        least_opening_deg=opening,
+        aggregate=task.aggregate,
     )
     return error, search.Sets(sets.members[:most], sets.value[:most])
 
 
 def _pairs(
-    task: Task, table: BeamTable, cost: FloatArray, places: FloatArray, apart: float, how: How | None, most: int
+    task: Task,
+    table: BeamTable,
+    cost: FloatArray,
+    places: FloatArray,
+    apart: float,
+    how: How | None,
+    most: int,
 ) -> tuple[FloatArray, search.Sets]:
     """Best partner's value of every candidate, and the best distinct pairs, of those that see every target."""
     kept = np.flatnonzero(table.seen.all(axis=0))
@@ -181,7 +197,10 @@ def _ranked(improve: Improve, places_m: FloatArray, value: float, *, rank: int) 
     """One set with its numbers, the constraint that binds, and its line."""
     task = improve.task
     positions = np.concatenate([standing_m(task, place) for place in places_m])
-    numbers = numbers_of(task, [*(of_lidar(task, lidar) for lidar in task.fixed), *(look(task, one[None]) for one in positions)])
+    numbers = numbers_of(
+        task,
+        [*(of_lidar(task, lidar) for lidar in task.fixed), *(look(task, one[None]) for one in positions)],
+    )
     binds = binding(improve, places_m, value)
     return Ranked(rank, positions, value, numbers, binds, _line(task, positions, numbers, binds))
 
@@ -196,14 +215,24 @@ def _declared(improve: Improve) -> Ranked | None:
     positions = np.array([lidar.position for lidar in task.replaced], dtype=np.float64)
     broken = [name for one in looks for name, slack in one.slack.items() if not (slack >= 0.0).all()]
     value = numbers.value(task.criterion, task.aggregate) + float(improve.cost(positions[:, :2]).sum())
-    return Ranked(0, positions, value, numbers, tuple(dict.fromkeys(broken)), _line(task, positions, numbers, None))
+    return Ranked(
+        0, positions, value, numbers, tuple(dict.fromkeys(broken)), _line(task, positions, numbers, None)
+    )
+
+
+def with_turbulence(task: Task, item: Ranked) -> tuple[FloatArray, FloatArray]:
+    """Speed [m/s] and direction [deg] error of one retrieval at each target, turbulence included."""
+    lidars = [of_lidar(task, lidar) for lidar in task.fixed]
+    return turbulent_numbers(task, [*lidars, *(look(task, one[None]) for one in item.positions_m)])
 
 
 def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str, ...] | None) -> str:
     """What one set is, in a line."""
     spots = " and ".join(f"E {east:.0f} N {north:.0f}" for east, north, _ in positions)
     worst = int(np.argmax(numbers.speed_std_mps))
-    parts = [f"{spots}: speed {numbers.speed_std_mps.max():.4f} m/s, direction {numbers.direction_std_deg.max():.3f}°"]
+    parts = [
+        f"{spots}: speed {numbers.speed_std_mps.max():.4f} m/s, direction {numbers.direction_std_deg.max():.3f}°"
+    ]
     if len(task.targets) > 1:
         parts[0] += f" at the worst target ({task.targets[worst]} for speed)"
     if np.isfinite(numbers.opening_deg).all():
@@ -213,7 +242,10 @@ def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str,
     parts.append(f"elevation {_span(numbers.elevation_deg[:, placed], '°', 1)}")
     if binds is None:
         return ", ".join(parts)
-    parts.append("bound by " + (", ".join(CRITERIA[name][1] for name in binds) if binds else "nothing: the error is least here"))
+    parts.append(
+        "bound by "
+        + (", ".join(CRITERIA[name][1] for name in binds) if binds else "nothing: the error is least here")
+    )
     return ", ".join(parts)
 
 
@@ -228,22 +260,33 @@ def _why(task: Task, best: Ranked, declared: Ranked | None) -> str:
         return "the site has no lidars to compare with"
     names = " and ".join(lidar.name for lidar in task.replaced)
     change = best.value / declared.value - 1.0
-    verdict = f"{-change:.1%} smaller" if change < -WORTH else "as small" if change <= WORTH else f"{change:.1%} larger"
+    verdict = (
+        f"{-change:.1%} smaller"
+        if change < -WORTH
+        else "as small"
+        if change <= WORTH
+        else f"{change:.1%} larger"
+    )
     old, new = declared.numbers, best.numbers
     reasons = [
         f"the error of the {WHAT[task.criterion]} at {'the worst target' if len(task.targets) > 1 else task.targets[0]} is "
-        f"{verdict} than with {names} where declared" if change < -WORTH or change > WORTH
+        f"{verdict} than with {names} where declared"
+        if change < -WORTH or change > WORTH
         else f"the error of the {WHAT[task.criterion]} is {verdict} as with {names} where declared",
         f"speed {new.speed_std_mps.max():.4f} against {old.speed_std_mps.max():.4f} m/s",
         f"direction {new.direction_std_deg.max():.3f} against {old.direction_std_deg.max():.3f}°",
     ]
     if np.isfinite(new.opening_deg).all() and np.isfinite(old.opening_deg).all():
-        reasons.append(f"the beams cross at {_span(new.opening_deg, '°')} instead of {_span(old.opening_deg, '°')}")
+        reasons.append(
+            f"the beams cross at {_span(new.opening_deg, '°')} instead of {_span(old.opening_deg, '°')}"
+        )
     placed = slice(len(task.fixed), None)
     reasons.append(
         f"at ranges of {_span(new.range_m[:, placed], ' m')} instead of {_span(old.range_m[:, placed], ' m')} and elevations of "
         f"{_span(new.elevation_deg[:, placed], '°', 1)} instead of {_span(old.elevation_deg[:, placed], '°', 1)}"
     )
     if declared.binds:
-        reasons.append(f"the declared place breaks: {', '.join(CRITERIA[name][1] for name in declared.binds)}")
+        reasons.append(
+            f"the declared place breaks: {', '.join(CRITERIA[name][1] for name in declared.binds)}"
+        )
     return "; ".join(reasons)

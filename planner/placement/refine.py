@@ -20,7 +20,11 @@ AROUND = np.stack(np.meshgrid(np.arange(-3, 4), np.arange(-3, 4)), axis=-1).resh
 SWEEPS = 2  # through the lidars of a set on each level
 POLISH_STEPS = 20  # of Nelder and Mead's simplex, for each coordinate
 WORTH = 1e-4  # a place is better if its error is smaller by this share
-TOUCHED = {"m": 1.0, "deg": 0.05, "share": 0.002}  # less than this is left over: the constraint is met with nothing to spare
+TOUCHED = {
+    "m": 1.0,
+    "deg": 0.05,
+    "share": 0.002,
+}  # less than this is left over: the constraint is met with nothing to spare
 LOOK_AROUND = 16  # directions in which the constraint that binds is sought
 
 
@@ -97,7 +101,10 @@ def _moved(
     rest = np.delete(places, number, axis=0)
     around = places[number] + step_m * AROUND
     others = [] if improve.task.single else [improve.table(place) for place in rest]
-    values = improve.values(others, look(improve.task, standing_m(improve.task, around))) + improve.cost(rest).sum()
+    values = (
+        improve.values(others, look(improve.task, standing_m(improve.task, around)))
+        + improve.cost(rest).sum()
+    )
     best = int(np.argmin(values))
     if not values[best] < now:
         return places, now
@@ -118,7 +125,12 @@ def _polished(improve: Improve, places: FloatArray, now: float, step_m: float) -
         value,
         start,
         method="Nelder-Mead",
-        options={"initial_simplex": simplex, "maxfev": POLISH_STEPS * start.size, "xatol": 0.1, "fatol": 1e-7},
+        options={
+            "initial_simplex": simplex,
+            "maxfev": POLISH_STEPS * start.size,
+            "xatol": 0.1,
+            "fatol": 1e-7,
+        },
     )
     return (found.x.reshape(places.shape), float(found.fun)) if found.fun < now else (places, now)
 
@@ -162,6 +174,12 @@ def _unconstrained(improve: Improve, rest: FloatArray, seen: Look) -> tuple[Floa
     table = table_of(task, known)
     free = added_value([*improve.fixed, *others], table, least_opening_deg=0.0, aggregate=task.aggregate)
     crossing = added_value(
-        [*improve.fixed, *others], table, least_opening_deg=task.limits.least_opening_deg, aggregate=task.aggregate
+        [*improve.fixed, *others],
+        table,
+        least_opening_deg=task.limits.least_opening_deg,
+        aggregate=task.aggregate,
     )
-    return free + improve.cost(seen.positions_m[:, :2]), {**broken, "opening": np.isinf(crossing) & np.isfinite(free)}
+    return free + improve.cost(seen.positions_m[:, :2]), {
+        **broken,
+        "opening": np.isinf(crossing) & np.isfinite(free),
+    }

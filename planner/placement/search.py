@@ -67,10 +67,11 @@ def best_partners(tables: PairTables, *, how: How | None = None) -> tuple[FloatA
     """
     batches = _pair_batches(tables.table.candidates, tables.table.targets)
     pairs = tables.table.candidates**2 / 2
-    parts = run(
-        pair_batch, tables, batches, how=how, expected_s=pairs * tables.table.targets * PAIR_TARGET_S
+    parts = run(pair_batch, tables, batches, how=how, expected_s=pairs * tables.table.targets * PAIR_TARGET_S)
+    value, partner = (
+        np.full(tables.table.candidates, np.inf),
+        np.full(tables.table.candidates, -1, dtype=np.intp),
     )
-    value, partner = np.full(tables.table.candidates, np.inf), np.full(tables.table.candidates, -1, dtype=np.intp)
     for found, index in parts:
         _keep_better(value, partner, found, index)
     return value, partner
@@ -96,7 +97,10 @@ def pair_batch(tables: PairTables, batch: Batch) -> tuple[FloatArray, IntArray]:
 
 def _tile(tables: PairTables, first: BeamTable, second: BeamTable) -> FloatArray:
     """(first, second) standard error of all pairs of two tiles."""
-    total, least = np.zeros((first.candidates, second.candidates)), np.ones((first.candidates, second.candidates))
+    total, least = (
+        np.zeros((first.candidates, second.candidates)),
+        np.ones((first.candidates, second.candidates)),
+    )
     for target in range(first.targets):
         variance, sine2 = pair_variance(first, second, target)
         np.minimum(least, sine2, out=least)
@@ -136,7 +140,9 @@ def distinct_pairs(
     return _distinct(members, np.where(partner >= 0, value, np.inf), places_m, apart_m=apart_m, most=most)
 
 
-def _distinct(members: IntArray, value: FloatArray, places_m: FloatArray, *, apart_m: float, most: int) -> Sets:
+def _distinct(
+    members: IntArray, value: FloatArray, places_m: FloatArray, *, apart_m: float, most: int
+) -> Sets:
     chosen: list[int] = []
     left = np.isfinite(value)
     while left.any() and len(chosen) < most:
@@ -188,10 +194,13 @@ def best_sets(
     Sets
         One for each start, best first, each only once.
     """
+
     def value_of(others: list[int]) -> FloatArray:
         rest = [*fixed, *(table.take([index]) for index in others)]
-        variance = np.where(_crossing([*rest, table], least_opening_deg), set_variance([*rest, table]), UNSEEN)
-        return aggregated(variance, aggregate) + cost + cost[others].sum()
+        variance = np.where(
+            _crossing([*rest, table], least_opening_deg), set_variance([*rest, table]), UNSEEN
+        )
+        return np.asarray(aggregated(variance, aggregate) + cost + cost[others].sum())
 
     found: dict[tuple[int, ...], float] = {}
     for start in starts:
@@ -200,7 +209,9 @@ def best_sets(
             members.append(int(np.argmin(value_of(members))))
         members, value = _exchanged(members, value_of)
         found[tuple(sorted(members))] = value
-    ordered = [item for item in sorted(found.items(), key=_by_value) if item[1] < np.sqrt(UNSEEN / table.targets)]
+    ordered = [
+        item for item in sorted(found.items(), key=_by_value) if item[1] < np.sqrt(UNSEEN / table.targets)
+    ]
     indices = np.array([members for members, _ in ordered], dtype=np.intp).reshape(-1, count)
     return Sets(indices, np.array([value for _, value in ordered]))
 

@@ -1,6 +1,6 @@
 """What is to be placed, for which targets, and what any place has to keep to."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -53,7 +53,9 @@ class Limits(NamedTuple):
     most_elevation_deg: float = STEEPEST_DEG
     least_opening_deg: float = LEAST_OPENING_DEG  # of the two beams of a set that cross best, in plan
     most_lost_share: float = MOST_LOST_SHARE  # of the wanted wind, to wakes, beyond the target's own
-    least_valid_share: float = LEAST_VALID_SHARE  # of rays whose echo is strong enough, where `signal` is declared
+    least_valid_share: float = (
+        LEAST_VALID_SHARE  # of rays whose echo is strong enough, where `signal` is declared
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,16 +112,28 @@ class Task:
         """(target, 3) east, north, up from the site's origin [m]."""
         return self.places.local_m(self.targets_m)
 
+    def _site_at(self, number: int) -> Site:
+        """The site with the ground as it is under a target: its power law counts from there."""
+        if self.terrain is None:
+            return self.site
+        ground_m = float(self.terrain.heights_m(*self.targets_m[number, :2]))
+        return self.site.model_copy(update={"ground_height_m": ground_m, "terrain": None})
+
     @cached_property
     def climates(self) -> tuple[Climate, ...]:
         """The wind at each target: declared directions, else those free of wakes at the target itself."""
-        return tuple(climate_at(self.site, name, self._excluded(number)) for number, name in enumerate(self.targets))
+        return tuple(
+            climate_at(self._site_at(number), name, self._excluded(number))
+            for number, name in enumerate(self.targets)
+        )
 
     def _excluded(self, number: int) -> SectorSet:
         wakes, point = self.site.wakes, self.local_targets_m[number].reshape(1, 3)
         sets = []
         if wakes.model in ("jensen", "union"):
-            sets += jensen_excluded(self.places.rotors, point, decay=wakes.decay, max_diameters=wakes.max_diameters)
+            sets += jensen_excluded(
+                self.places.rotors, point, decay=wakes.decay, max_diameters=wakes.max_diameters
+            )
         if wakes.model in ("iec", "union"):
             sets += iec_excluded(self.places.rotors, point, max_diameters=wakes.max_diameters)
         return any_of(sets)
@@ -127,7 +141,7 @@ class Task:
     @cached_property
     def states(self) -> tuple[WindState, ...]:
         """Everything of the wind at each target but speed and direction."""
-        return tuple(state_like(self.site, name) for name in self.targets)
+        return tuple(state_like(self._site_at(number), name) for number, name in enumerate(self.targets))
 
     @cached_property
     def sources(self) -> ErrorSources:
@@ -148,7 +162,8 @@ class Task:
         points = (self.scan.fft_points if self.scan else None) or (pulse.fft_points if pulse else None)
         sample_ns = self.pattern.device.sample_ns
         return Probe(
-            pulse_ns=pulse_ns or DEFAULT_PULSE_NS, window_ns=window_ns(points or DEFAULT_FFT_POINTS, sample_ns)
+            pulse_ns=pulse_ns or DEFAULT_PULSE_NS,
+            window_ns=window_ns(points or DEFAULT_FFT_POINTS, sample_ns),
         )
 
     @cached_property
@@ -159,6 +174,13 @@ class Task:
         steps = round(self.scan.sector_deg / self.scan.step_deg)
         rays = steps if self.scan.motion == "continuous" else steps + 1
         return np.asarray((np.arange(rays) - 0.5 * (rays - 1)) * self.scan.step_deg)
+
+
+def on_terrain(task: Task, terrain: HeightRaster) -> Task:
+    """The task on a terrain: the head stands as high above it as the declared lidar does, 2 m where that is not known."""
+    east, north, head = task.pattern.position
+    height_m = head - float(terrain.heights_m(east, north))
+    return replace(task, terrain=terrain, head_height_m=height_m if height_m > 0 else HEAD_HEIGHT_M)
 
 
 def default_limits(lidar: Lidar, scan: ScanPlan | None) -> Limits:
@@ -173,7 +195,9 @@ def default_limits(lidar: Lidar, scan: ScanPlan | None) -> Limits:
     if scan is not None and scan.gates is not None:
         known.append(scan.gates.first_m + scan.gates.spacing_m * (scan.gates.count - 1))
     reached = [value for value in known if value is not None] or [ORDINARY_RANGE_M]
-    low, high = (device.head.elevation_min_deg, device.head.elevation_max_deg) if device.head else (None, None)
+    low, high = (
+        (device.head.elevation_min_deg, device.head.elevation_max_deg) if device.head else (None, None)
+    )
     return Limits(
         least_range_m=device.min_range_m or 0.0,
         most_range_m=min(reached),
@@ -218,6 +242,7 @@ def task_of(
     alone = not fixed and (count == 1 or (count is None and sector is not None))
     number = count or (1 if fixed or alone else 2)
     free = [name for name in in_pair or [lidar.name for lidar in site.lidars] if name not in fixed]
+    scan: ScanPlan | None
     if alone and sector is not None:
         pattern, scan = site.lidar(sector.lidar), sector
     else:

@@ -7,16 +7,41 @@ import numpy as np
 from geometry.arrays import FloatArray
 from planner.placement.maps import CRITERIA, Look
 from planner.placement.numbers import lidar_names
-from planner.placement.ranking import Placement, Ranked
+from planner.placement.ranking import Placement, Ranked, with_turbulence
 from planner.placement.search import UNSEEN
 
 UNIT = {"vector": "m/s", "speed": "m/s", "direction": "deg"}
 
 
-def rows_of(found: Placement) -> list[dict[str, object]]:
-    """One row for each ranked set and, with rank 0, for the declared places: what `--json` prints."""
+def rows_of(found: Placement, *, turbulent: bool = False) -> list[dict[str, object]]:
+    """One row for each ranked set and, with rank 0, for the declared places: what `--json` prints.
+
+    With `turbulent` each target has the turbulent tier's error of one retrieval as well.
+    """
     items = [*([found.declared] if found.declared else []), *found.ranked]
-    return [_row(found, item) for item in items]
+    rows = [_row(found, item) for item in items]
+    for row, item in zip(rows, items if turbulent else [], strict=False):
+        targets = row["targets"]
+        assert isinstance(targets, list)
+        for target, speed, direction in zip(targets, *with_turbulence(found.task, item), strict=True):
+            target["turbulent_speed_std_mps"] = _known(speed)
+            target["turbulent_direction_std_deg"] = _known(direction)
+    return rows
+
+
+def turbulent_lines(rows: list[dict[str, object]]) -> list[str]:
+    """The turbulent errors of rows, in words."""
+    lines = []
+    for row in rows:
+        targets = row["targets"]
+        assert isinstance(targets, list)
+        speeds = [item["turbulent_speed_std_mps"] for item in targets]
+        turns = [item["turbulent_direction_std_deg"] for item in targets]
+        known = all(value is not None for value in (*speeds, *turns))
+        name = f"{row['rank']}." if row["rank"] else "declared:"
+        said = f"speed {max(speeds):.3f} m/s, direction {max(turns):.2f}°" if known else "not known"
+        lines.append(f"{name} one retrieval with turbulence: {said}")
+    return lines
 
 
 def _row(found: Placement, item: Ranked) -> dict[str, object]:
@@ -28,7 +53,12 @@ def _row(found: Placement, item: Ranked) -> dict[str, object]:
         "rank": item.rank,
         "declared": item.rank == 0,
         "positions": [
-            {"lidar": name, "easting_m": round(east, 2), "northing_m": round(north, 2), "height_m": round(height, 2)}
+            {
+                "lidar": name,
+                "easting_m": round(east, 2),
+                "northing_m": round(north, 2),
+                "height_m": round(height, 2),
+            }
             for name, (east, north, height) in zip(placed, item.positions_m.tolist(), strict=True)
         ],
         "standing": [lidar.name for lidar in task.fixed],
@@ -83,7 +113,8 @@ def write_tables(found: Placement, folder: Path) -> list[str]:
 
     rows = rows_of(found)
     ranking = [
-        {key: row[key] for key in ("rank", "declared", "criterion", "aggregate", "value", "unit", "text")} | _flat(row)
+        {key: row[key] for key in ("rank", "declared", "criterion", "aggregate", "value", "unit", "text")}
+        | _flat(row)
         for row in rows
     ]
     pd.DataFrame(ranking).to_csv(folder / "places.csv", index=False)
@@ -110,7 +141,10 @@ def _target_lines(row: dict[str, object], names: tuple[str, ...]) -> list[dict[s
     return [
         {"rank": row["rank"], "target": item["target"], "lidar": name, "range_m": item["range_m"][number]}
         | {key: item[key][number] for key in ("azimuth_true_deg", "elevation_deg")}
-        | {key: item[key] for key in ("speed_std_mps", "direction_std_deg", "opening_angle_deg", "lost_share")}
+        | {
+            key: item[key]
+            for key in ("speed_std_mps", "direction_std_deg", "opening_angle_deg", "lost_share")
+        }
         for item in targets
         for number, name in enumerate(names)
     ]
@@ -122,7 +156,12 @@ def write_geopackage(found: Placement, folder: Path) -> str:
 
     rows = [
         {"rank": row["rank"], "lidar": place["lidar"], "height_m": place["height_m"], "value": row["value"]}
-        | {"unit": row["unit"], "text": row["text"], "easting_m": place["easting_m"], "northing_m": place["northing_m"]}
+        | {
+            "unit": row["unit"],
+            "text": row["text"],
+            "easting_m": place["easting_m"],
+            "northing_m": place["northing_m"],
+        }
         for row in rows_of(found)
         for place in _places(row)
     ]
@@ -151,7 +190,9 @@ def write_all(found: Placement, folder: Path) -> tuple[list[str], str | None]:
 
     names = [*write_tables(found, folder), write_geopackage(found, folder)]
     try:
-        write_geotiff(folder / "maps.tif", layers(found), found.grid.east_m, found.grid.north_m, found.task.site.crs)
+        write_geotiff(
+            folder / "maps.tif", layers(found), found.grid.east_m, found.grid.north_m, found.task.site.crs
+        )
     except UnavailableError as error:
         return names, str(error)
     return [*names, "maps.tif"], None

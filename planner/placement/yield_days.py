@@ -12,7 +12,9 @@ from planner.site import Site
 from planner.wind_rose import load_rose, share_within
 
 PERIODS_PER_DAY = 144  # of ten minutes
-SPEED_EDGES_MPS = tuple(float(edge) for edge in range(4, 26))  # bins of 1 m/s, as in a verification of wind speed
+SPEED_EDGES_MPS = tuple(
+    float(edge) for edge in range(4, 26)
+)  # bins of 1 m/s, as in a verification of wind speed
 DIRECTION_STEP_DEG = 30.0
 
 # The reference study kept 148 of the 1008 ten-minute values of its week.
@@ -83,7 +85,13 @@ def expected_yield(
     (381, 0.39)
     """
     edges = np.asarray(speed_edges_mps, dtype=np.float64)
-    if not (days > 0 and 0 <= availability <= 1 and edges.ndim == 1 and edges.size >= 2 and np.all(np.diff(edges) > 0)):
+    if not (
+        days > 0
+        and 0 <= availability <= 1
+        and edges.ndim == 1
+        and edges.size >= 2
+        and np.all(np.diff(edges) > 0)
+    ):
         raise InputError(
             f"{days} days with an availability of {availability} and speed edges {edges.tolist()} came; allowed are days "
             "above 0, an availability from 0 to 1, and ascending edges"
@@ -97,7 +105,7 @@ def expected_yield(
         cell = SectorSet.of([Sector(number * direction_step_deg, direction_step_deg)]).intersection(kept)
         share[:, number] = _speed_shares(site, cell, edges)
     periods = days * PERIODS_PER_DAY
-    return Yield(edges, np.arange(count + 1) * direction_step_deg, share * periods * availability, periods)
+    return Yield(edges, np.linspace(0.0, 360.0, count + 1), share * periods * availability, periods)
 
 
 def days_needed(one_day: Yield, *, least_per_bin: float, wanted: ArrayLike | None = None) -> float:
@@ -147,13 +155,14 @@ def _speed_shares(site: Site, cell: SectorSet, edges: FloatArray) -> FloatArray:
         rose = load_rose(wind.rose)
         if rose.weibull_scale_mps is not None and rose.weibull_shape is not None:
             parts = zip(rose.sectors, rose.share, rose.weibull_scale_mps, rose.weibull_shape, strict=True)
-            return np.sum(
-                [
-                    share * cell.intersection(SectorSet.of([sector])).width_deg / sector.width_deg * _shares(a, k, limits)
-                    for sector, share, a, k in parts
-                ],
-                axis=0,
-            )
+            each = [
+                share
+                * cell.intersection(SectorSet.of([sector])).width_deg
+                / sector.width_deg
+                * _shares(a, k, limits)
+                for sector, share, a, k in parts
+            ]
+            return np.asarray(np.sum(each, axis=0))
     if wind.weibull is None:
         raise InputError(
             "how often each speed blows is not declared: give wind.weibull, or a rose with weibull_scale_mps and weibull_shape"

@@ -50,12 +50,18 @@ def pair_task(targets: int = TARGETS) -> Task:
 def bench_viewshed() -> None:
     """1000 x 1000 cells from one target."""
     rows, columns = np.mgrid[:1000, :1000]
-    hills = 300.0 + 60.0 * np.sin(rows / 40.0) * np.cos(columns / 55.0) + 15.0 * np.sin(rows / 7.0 + columns / 9.0)
+    hills = (
+        300.0
+        + 60.0 * np.sin(rows / 40.0) * np.cos(columns / 55.0)
+        + 15.0 * np.sin(rows / 7.0 + columns / 9.0)
+    )
     raster = HeightRaster(hills, 0.0, 20_000.0, 20.0, 20.0, "above_sea_level")
     wall, busy = time.perf_counter(), time.process_time()
     seen = viewshed(raster, [9000.0, 11_000.0, 480.0])
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
-    print(f"viewshed 1000 x 1000: {wall:.2f} s (limit 1), {busy:.2f} s of a core, {np.mean(seen <= 3.0):.0%} seen")
+    print(
+        f"viewshed 1000 x 1000: {wall:.2f} s (limit 1), {busy:.2f} s of a core, {np.mean(seen <= 3.0):.0%} seen"
+    )
 
 
 def bench_pair() -> None:
@@ -64,7 +70,9 @@ def bench_pair() -> None:
     wall, busy = time.perf_counter(), time.process_time()
     found = place(task, default_grid(task))
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
-    print(f"best pair, 100 x 100 candidates, {TARGETS} targets: {wall:.1f} s (limit 20), {busy:.1f} s of this process")
+    print(
+        f"best pair, 100 x 100 candidates, {TARGETS} targets: {wall:.1f} s (limit 20), {busy:.1f} s of this process"
+    )
     for item in found.ranked:
         print(f"  {item.rank}. {item.text}")
 

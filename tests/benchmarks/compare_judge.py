@@ -105,18 +105,18 @@ AIRS = (
         Turbulence(0.20, 60.0),
         10.0,
         0.2,
-        6.0,
+        5.0,
         {
-            "60°, along": (sector(30, 2.0), 0.0),
-            "30°, 45° off": (sector(15, 2.0), 135.0),
-            "30°, across, one way": (sector(15, 2.0, back_and_forth=False), 90.0),
+            "60° at 500 m, along": (sector(30, 2.0, range_m=500.0), 0.0),
+            "30° at 500 m, 45° off": (sector(15, 2.0, range_m=500.0), 135.0),
+            "30° at 500 m, across, one way": (sector(15, 2.0, back_and_forth=False, range_m=500.0), 90.0),
         },
     ),
     Air(
         Turbulence(0.15, 120.0),
         8.0,
         0.0,
-        12.0,
+        7.0,
         {
             "dual 90°": (dual(90.0, (SHORT, SHORT)), 300.0),
             "dual 63°": (dual(63.0, (SHORT, SHORT)), 300.0),

@@ -58,7 +58,9 @@ def markdown(lines: list[Row]) -> str:
     out = ["| what | where | digits | condition |", "|---|---|---|---|"]
     for line in lines:
         known = "NaN" if line.digits is None else f"{line.digits:.0f}"
-        number = "" if line.condition is None else f"{line.condition:.1e}".replace("e+0", "e").replace("e+", "e")
+        number = (
+            "" if line.condition is None else f"{line.condition:.1e}".replace("e+0", "e").replace("e+", "e")
+        )
         out.append(f"| {line.quantity} | {line.where} | {known} | {number} |")
     return "\n".join(out)
 
@@ -129,13 +131,19 @@ def _beams() -> Iterator[Row]:
                     mpmath.hypot(level, u),
                 )
             found = beam_to(enu)
-            worst = min(digits(float(g), x, s) for g, x, s in zip(found, exact, (360, 90, range_m), strict=True))
-            yield Row("azimuth, elevation, range of a point", f"{range_m:g} m, elevation {elevation:.9g}°", worst)
+            worst = min(
+                digits(float(g), x, s) for g, x, s in zip(found, exact, (360, 90, range_m), strict=True)
+            )
+            yield Row(
+                "azimuth, elevation, range of a point", f"{range_m:g} m, elevation {elevation:.9g}°", worst
+            )
     scan = sector(217.3, 0.0, sector_deg=0.001, step_deg=1e-8, accumulation_s=0.1, head=HEAD)
     with mp.workdps(oracle.DIGITS):
         start = mpf(217.3) - mpf(0.001) / 2
         step = mpf(0.001) / 100_000
-        worst = min(digits(scan.azimuth_deg[i], start + (i + mpf(0.5)) * step, step) for i in range(0, 100_000, 997))
+        worst = min(
+            digits(scan.azimuth_deg[i], start + (i + mpf(0.5)) * step, step) for i in range(0, 100_000, 997)
+        )
     yield Row("place of a ray, in steps", "100,000 rays in 0.001°", worst)
 
 
@@ -156,10 +164,13 @@ def frame_errors(
 ) -> tuple[mpf, float, float]:
     """Error of a position in east, north, up [m], digits of convergence and of scale."""
     turn = np.degrees(range_m / 6.4e6)
-    ends = (longitude, latitude, 5.0), (
-        longitude + 0.6 * turn / np.cos(np.radians(latitude)),
-        latitude - 0.8 * turn,
-        105.0,
+    ends = (
+        (longitude, latitude, 5.0),
+        (
+            longitude + 0.6 * turn / np.cos(np.radians(latitude)),
+            latitude - 0.8 * turn,
+            105.0,
+        ),
     )
     plane = [oracle.utm(*end[:2], meridian_deg=meridian, south=south) for end in ends]
     grid = [[float(e), float(n), h[2]] for (e, n, _, _), h in zip(plane, ends, strict=True)]
@@ -185,7 +196,9 @@ def _frames() -> Iterator[Row]:
     head, point = [500_000.4, 9_999_999.7, 5.0], [500_800.1, 9_999_399.2, 105.0]
     exact = frame.enu_m(head, point)
     off = np.abs(frame.enu_m(np.float32(head), np.float32(point)) - exact).max()
-    yield Row("position at 1 km, of the range", "coordinates of 1e7 m in float32", float(-np.log10(off / 1000.0)))
+    yield Row(
+        "position at 1 km, of the range", "coordinates of 1e7 m in float32", float(-np.log10(off / 1000.0))
+    )
 
 
 def _crossings() -> Iterator[Row]:
@@ -199,7 +212,9 @@ def _crossings() -> Iterator[Row]:
         asked = [oracle.unit_vector(33.0, 2.0), oracle.unit_vector(33.0 + angle, 2.0 if angle < 90 else -2.0)]
         for name, given in (("its vectors", beams), ("its degrees", asked)):
             exact = oracle.crossing(heads[0], list(given[0]), heads[1], list(given[1]))
-            worst = min(digits(float(got.range1_m), exact["range1"]), digits(float(got.angle_deg), exact["angle"]))
+            worst = min(
+                digits(float(got.range1_m), exact["range1"]), digits(float(got.angle_deg), exact["angle"])
+            )
             number = 1 / float(mpmath.sin(mpmath.radians(exact["angle"])))
             yield Row(f"range and angle of a crossing, of {name}", f"{angle:.12g}°", worst, number)
 
@@ -221,7 +236,9 @@ def _retrievals() -> Iterator[Row]:
         found = wind_digits(217.3 + width / count * np.arange(count), 3.0)
         yield Row("wind of a sector", f"{width:g}°, {count} rays", *found)
     yield Row("wind of a sector", "360°, 2 rays", *wind_digits(np.array([37.3, 217.3]), 3.0))
-    yield Row("wind of a sector", "60°, 30 rays, elevation 89.999°", *wind_digits(30 + 2 * np.arange(30.0), 89.999))
+    yield Row(
+        "wind of a sector", "60°, 30 rays, elevation 89.999°", *wind_digits(30 + 2 * np.arange(30.0), 89.999)
+    )
     yield Row("wind of a sector", "60°, 30 rays, elevation 90°", *wind_digits(30 + 2 * np.arange(30.0), 90.0))
     for angle in (1e-11, 1e-9, 1e-6, 90.0, 180 - 1e-9, 180.0):
         found = wind_digits(np.array([33.0, 33.0 + angle]), 0.0)
@@ -265,11 +282,21 @@ def _moments() -> Iterator[Row]:
     for std in (0.001, 1.0, 100.0, 16_205.0):
         got = wind_moments([0.0, -10.0], np.diag([std**2, 0.0]))
         exact = across_mean(10.0, std)
-        yield Row("mean speed", f"10 m/s, error of {std:g} m/s across alone", digits(10 + got.speed_bias_mps, exact))
-        yield Row("bias of the speed", f"10 m/s, error of {std:g} m/s across alone", digits(got.speed_bias_mps, exact - 10))
+        yield Row(
+            "mean speed", f"10 m/s, error of {std:g} m/s across alone", digits(10 + got.speed_bias_mps, exact)
+        )
+        yield Row(
+            "bias of the speed",
+            f"10 m/s, error of {std:g} m/s across alone",
+            digits(got.speed_bias_mps, exact - 10),
+        )
     for speed in (0.0, 1e-3, 10.0):
         got = wind_moments([0.0, -speed], np.diag([100.0, 100.0]))
-        yield Row("mean speed", f"{speed:g} m/s, error of 10 m/s each way", digits(speed + got.speed_bias_mps, rice_mean(speed, 10)))
+        yield Row(
+            "mean speed",
+            f"{speed:g} m/s, error of 10 m/s each way",
+            digits(speed + got.speed_bias_mps, rice_mean(speed, 10)),
+        )
     lost = wind_moments([0.0, -1e-12], np.diag([100.0, 100.0])).direction_bias_deg
     yield Row("mean direction", "1e-12 m/s, error of 10 m/s each way", None if np.isnan(lost) else 0.0)
 
@@ -298,14 +325,16 @@ def _maps() -> Iterator[Row]:
         ("baseline 1 km, on it", 1000.0, 0.0, 0.0),
     )
     for name, size, origin, side in scenes:
-        heads = np.array([[0.0, 0.0, 0.0], [size, 0.0, 0.0]]) + [origin, 0.0, 0.0]
+        heads = np.array([[origin, 0.0, 0.0], [origin + size, 0.0, 0.0]])
         target = [origin + 0.4 * size, side * size, 0.1 * size if side > 0.1 else 0.0]
         got = pair_map(heads, *target, wind, noise)
         if np.isnan(got.speed_std_mps):
             yield Row("error of two lidars", name, None, float(got.condition))
             continue
         with mp.workdps(oracle.DIGITS):
-            beams = [[mpf(float(t)) - mpf(float(h)) for t, h in zip(target, head, strict=True)] for head in heads]
+            beams = [
+                [mpf(float(t)) - mpf(float(h)) for t, h in zip(target, head, strict=True)] for head in heads
+            ]
             a, b = ([x / mpmath.sqrt(oracle.dot(beam, beam)) for x in beam] for beam in beams)
             exact = mpmath.hypot(a[0], b[0]) / abs(a[0] * b[1] - a[1] * b[0]) / 10
         yield Row("error of two lidars", name, digits(got.speed_std_mps, exact), float(got.condition))

@@ -87,7 +87,9 @@ def test_crossings_keep_the_digits_of_their_vectors_and_what_degrees_leave(azimu
 @given(st.floats(0, 360), st.floats(-89, 89))
 def test_opposite_beams_meet_nowhere(azimuth, elevation):
     """At 180 degrees no crossing is known, whatever rounding the azimuths bring: NaN, with angle and gap."""
-    away = cross([0, 0, 0], unit_vector(azimuth, elevation), [0, 0, 7], unit_vector(azimuth + 180, -elevation))
+    away = cross(
+        [0, 0, 0], unit_vector(azimuth, elevation), [0, 0, 7], unit_vector(azimuth + 180, -elevation)
+    )
     assert np.isnan(away.range1_m) and np.isnan(away.point2_m).all() and np.isnan(away.height_difference_m)
     assert float(away.angle_deg) == pytest.approx(180.0, abs=1e-12)
     assert float(away.gap_m) == pytest.approx(7 * math.cos(math.radians(elevation)), rel=1e-9)
@@ -102,7 +104,9 @@ def test_a_beam_at_ninety_degrees_has_no_opening_angle(elevation):
     assert float(got.gap_m) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(("angle", "length"), [(0.0, 43.0), (1e-9, 43.0), (180.0 - 1e-9, 43.0), (180.0, 43.0), (90.0, 21.5)])
+@pytest.mark.parametrize(
+    ("angle", "length"), [(0.0, 43.0), (1e-9, 43.0), (180.0 - 1e-9, 43.0), (180.0, 43.0), (90.0, 21.5)]
+)
 def test_probes_of_parallel_beams_share_all_their_air(angle, length):
     """Limits of 2 sqrt(D² - gap²)/sin: the whole probe when parallel, half of it at right angles."""
     assert float(shared_probe_length_m(angle, 0.0, 43.0, 43.0)) == pytest.approx(length, rel=1e-12)
@@ -128,7 +132,10 @@ def test_the_ends_of_sectors():
     assert np.isnan(circular_mean_deg([10.0, 190.0])) and np.isnan(circular_mean_deg([0.0, 120.0, 240.0]))
 
 
-@pytest.mark.parametrize(("size", "step", "count"), [(0.001, 1e-8, 100_000), (0.001, 5e-4, 2), (360.0, 180.0, 2), (360.0, 0.0036, 100_000)])
+@pytest.mark.parametrize(
+    ("size", "step", "count"),
+    [(0.001, 1e-8, 100_000), (0.001, 5e-4, 2), (360.0, 180.0, 2), (360.0, 0.0036, 100_000)],
+)
 def test_scans_of_two_and_of_a_hundred_thousand_rays(size, step, count):
     """Every ray stands where half-step arithmetic puts it, to the rounding of an azimuth; the arc is the sector."""
     scan = sector(217.3, 3.0, sector_deg=size, step_deg=step, accumulation_s=0.1, head=HEAD)

@@ -37,7 +37,9 @@ def test_a_plane_is_interpolated_exactly(slope_east, slope_north, base, east, no
 
 
 def test_a_raster_upside_down_is_turned_over():
-    south_first = HeightRaster.from_transform([[1.0, 1.0], [5.0, 5.0]], (10, 0, 0, 0, 10, 0), "above_sea_level")
+    south_first = HeightRaster.from_transform(
+        [[1.0, 1.0], [5.0, 5.0]], (10, 0, 0, 0, 10, 0), "above_sea_level"
+    )
     assert south_first.heights_m(10.0, 5.0) == 1.0
     assert south_first.heights_m(10.0, 15.0) == 5.0
 
@@ -87,7 +89,10 @@ def test_each_gate_is_judged_by_the_way_up_to_it():
 
 def test_a_beam_rises_over_the_earth_by_the_surveyors_formula():
     """2.83 m of curvature less 13 % at 6 km."""
-    assert abs(float(beam_height_m(5.0, 1.0, 6000.0)) - (5.0 + 6000 * np.tan(np.radians(1)) + 0.87 * 2.8253)) < 1e-3
+    assert (
+        abs(float(beam_height_m(5.0, 1.0, 6000.0)) - (5.0 + 6000 * np.tan(np.radians(1)) + 0.87 * 2.8253))
+        < 1e-3
+    )
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -108,7 +113,9 @@ def test_a_layer_never_lets_a_head_see_more():
     canopy[10:14] = 15.0
     target = [400.0, 100.0, float(raster.heights_m(400.0, 100.0)) + 20.0]
     head = np.stack([np.linspace(20, 780, 40), np.full(40, 700.0), np.full(40, 225.0)], axis=-1)
-    bare, grown = (terrain_sight(each, head, target).clearance_m for each in (raster, raster.with_layer(canopy)))
+    bare, grown = (
+        terrain_sight(each, head, target).clearance_m for each in (raster, raster.with_layer(canopy))
+    )
     assert np.all(grown <= bare + 1e-9) and np.any(grown < bare - 1.0)
 
 

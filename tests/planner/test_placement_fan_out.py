@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,9 +46,9 @@ def one_row_batches(tables):
 def die_once(shared, batch):
     """Square a number; the first worker that gets the third batch is killed."""
     folder, _ = shared
-    marker = os.path.join(folder, "died")
-    if batch == (3,) and not os.path.exists(marker):
-        open(marker, "w").close()
+    marker = Path(folder) / "died"
+    if batch == (3,) and not marker.exists():
+        marker.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return batch[0] ** 2
 
@@ -72,7 +73,9 @@ def test_processes_give_the_same_as_one():
 
 
 def test_a_killed_process_loses_nothing(tmp_path):
-    found = run(die_once, (str(tmp_path), 0), [(i,) for i in range(8)], how=How(processes=2), expected_s=100.0)
+    found = run(
+        die_once, (str(tmp_path), 0), [(i,) for i in range(8)], how=How(processes=2), expected_s=100.0
+    )
     assert (tmp_path / "died").exists()
     assert found == [i**2 for i in range(8)]
 
@@ -116,7 +119,7 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_ranking():
     """A worker dies while batches are worked on; the other takes them over."""
     distributed = pytest.importorskip("distributed")
     task = task_of(parse_site(SITE), count=2)
-    grid = Grid(np.linspace(446500, 449500, 30), np.linspace(6257500, 6254500, 30))
+    grid = Grid(np.linspace(446500, 449500, 17), np.linspace(6257500, 6254500, 17))
     here = place(task, grid, how=How(processes=1), most=2)
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
@@ -131,9 +134,13 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_ranking():
 
         tables = pair_tables(40)
         batches = one_row_batches(tables)
-        there = run(search.pair_batch, tables, batches, how=How(scheduler=cluster.scheduler_address, progress=kill))
+        there = run(
+            search.pair_batch, tables, batches, how=How(scheduler=cluster.scheduler_address, progress=kill)
+        )
         assert killed
         assert_same(run(search.pair_batch, tables, batches), there)
         ranked = place(replace(task), grid, how=How(scheduler=cluster.scheduler_address), most=2)
-    assert [item.positions_m.tolist() for item in ranked.ranked] == [item.positions_m.tolist() for item in here.ranked]
+    assert [item.positions_m.tolist() for item in ranked.ranked] == [
+        item.positions_m.tolist() for item in here.ranked
+    ]
     assert [item.text for item in ranked.ranked] == [item.text for item in here.ranked]

@@ -36,7 +36,12 @@ wind: {weibull: {scale_mps: 9, shape: 2}, directions_deg: [[200, 300]]}
 """
 
 SOURCES = ErrorSources(
-    radial_speed_mps=0.1, azimuth_deg=0.05, elevation_deg=0.05, range_m=5.0, heading_deg=0.05, levelling_deg=0.03
+    radial_speed_mps=0.1,
+    azimuth_deg=0.05,
+    elevation_deg=0.05,
+    range_m=5.0,
+    heading_deg=0.05,
+    levelling_deg=0.03,
 )
 
 
@@ -51,7 +56,9 @@ def judged(task, heads_m):
 
 
 def valued(task, looks):
-    return numbers_of(task, [*(of_lidar(task, lidar) for lidar in task.fixed), *looks]).value(task.criterion, task.aggregate)
+    return numbers_of(task, [*(of_lidar(task, lidar) for lidar in task.fixed), *looks]).value(
+        task.criterion, task.aggregate
+    )
 
 
 @pytest.mark.parametrize("criterion", ["vector", "speed", "direction"])
@@ -60,8 +67,14 @@ def test_the_table_of_beams_is_the_map_of_two_lidars(criterion, vertical_mps):
     """Averaged over the climate state by state, `pair_map` gives what the table gives at once."""
     rng = np.random.default_rng(1)
     heads, target = rng.uniform(-2000, 2000, (5, 3)) * [1, 1, 0.002], np.array([100.0, 50.0, 120.0])
-    climate = Climate(np.array([5.0, 8.0, 12.0, 6.0]), np.array([200.0, 200.0, 280.0, 280.0]), np.array([1.0, 2.0, 1.0, 3.0]))
-    like = WindState(speed_mps=1.0, from_deg=0.0, shear_exponent=0.14, height_m=120.0, vertical_mps=vertical_mps)
+    climate = Climate(
+        np.array([5.0, 8.0, 12.0, 6.0]),
+        np.array([200.0, 200.0, 280.0, 280.0]),
+        np.array([1.0, 2.0, 1.0, 3.0]),
+    )
+    like = WindState(
+        speed_mps=1.0, from_deg=0.0, shear_exponent=0.14, height_m=120.0, vertical_mps=vertical_mps
+    )
     table = beam_table(heads, [target], [climate], [like], SOURCES, criterion=criterion)
     found = pair_variance(table, table, 0)[0]
     for first, second in combinations(range(5), 2):
@@ -81,7 +94,13 @@ def test_a_lidar_alone_is_judged_like_its_sector_scan_in_the_core():
     task = replace(task_of(site, count=1), criterion="speed")
     seen = of_lidar(task, site.lidar("WS_S"))
     fast = sector_variance(
-        seen.local_m, task.local_targets_m[0], task.offsets_deg, task.climates[0], task.states[0], task.sources, criterion="speed"
+        seen.local_m,
+        task.local_targets_m[0],
+        task.offsets_deg,
+        task.climates[0],
+        task.states[0],
+        task.sources,
+        criterion="speed",
     )
     assert float(fast[0]) ** 0.5 == pytest.approx(float(numbers_of(task, [seen]).speed_std_mps[0]), rel=1e-3)
 
@@ -89,7 +108,7 @@ def test_a_lidar_alone_is_judged_like_its_sector_scan_in_the_core():
 @pytest.mark.parametrize("aggregate", ["worst", "mean"])
 def test_the_best_pair_is_the_best_of_all_pairs(aggregate):
     task = replace(task_of(parse_site(SITE), count=2), aggregate=aggregate)
-    grid = small_grid(task, 5)
+    grid = small_grid(task, 4)
     seen = look(task, standing_m(task, grid.places_m))
     kept = np.flatnonzero(seen.allowed.all(axis=0))
     looks, best = {index: look(task, seen.positions_m[[index]]) for index in kept}, np.inf
@@ -102,7 +121,7 @@ def test_the_best_pair_is_the_best_of_all_pairs(aggregate):
     value, partner = search.best_partners(tables)
     assert value.min() == pytest.approx(best, rel=1e-6)
     assert value[partner[int(np.argmin(value))]] == value.min()
-    assert place(task, grid).ranked[0].value <= best * (1 + 1e-9)
+    assert place(task, grid, most=1).ranked[0].value <= best * (1 + 1e-9)
 
 
 def test_the_best_three_are_the_best_of_all_triples():
@@ -117,7 +136,7 @@ def test_the_best_three_are_the_best_of_all_triples():
             [table.take([first]), table.take([second])], table, least_opening_deg=30.0, aggregate="worst"
         )
         best = min(best, float(values.min()))
-    found = place(task, grid)
+    found = place(task, grid, most=2)
     heads = found.ranked[0].positions_m
     assert found.ranked[0].value <= best * (1 + 1e-9)
     assert judged(task, heads) == pytest.approx(found.ranked[0].value, rel=1e-6)
@@ -153,8 +172,10 @@ def test_the_second_lidar_at_hovsore_is_better_than_the_real_one_and_says_why():
 
 def test_the_same_task_gives_the_same_places():
     task = task_of(parse_site(SITE), count=2)
-    first, second = (place(task, small_grid(task)) for _ in range(2))
-    assert [item.positions_m.tolist() for item in first.ranked] == [item.positions_m.tolist() for item in second.ranked]
+    first, second = (place(task, small_grid(task), most=2) for _ in range(2))
+    assert [item.positions_m.tolist() for item in first.ranked] == [
+        item.positions_m.tolist() for item in second.ranked
+    ]
 
 
 def test_the_range_that_is_too_short_is_named_with_what_it_must_give():
@@ -163,7 +184,9 @@ def test_the_range_that_is_too_short_is_named_with_what_it_must_give():
     with pytest.raises(InputError, match=r"range-max .* must give (\d+) m .*--max-range") as caught:
         place(short, small_grid(short))
     seen = look(short, standing_m(short, small_grid(short).places_m))
-    others = np.logical_and.reduce([slack >= 0 for name, slack in seen.slack.items() if name != "range-max"]).all(axis=0)
+    others = np.logical_and.reduce(
+        [slack >= 0 for name, slack in seen.slack.items() if name != "range-max"]
+    ).all(axis=0)
     needed = -seen.slack["range-max"].min(axis=0)[others].max()
     assert f"{needed:.3g} m" in str(caught.value)
 
@@ -171,7 +194,7 @@ def test_the_range_that_is_too_short_is_named_with_what_it_must_give():
 def test_beams_that_cannot_cross_steeply_enough_are_said():
     task = task_of(parse_site(SITE), count=2)
     strict = replace(task, limits=task.limits._replace(least_opening_deg=89.9))
-    with pytest.raises(InputError, match="cross at 89.9° or more at every target"):
+    with pytest.raises(InputError, match=r"cross at 89\.9° or more at every target"):
         place(strict, small_grid(strict))
 
 
@@ -186,7 +209,7 @@ def test_forbidden_ground_is_kept_free_and_distance_to_its_edge_counts():
     slack = area_slack_m(site, np.array([[447500.0, 6255400.0], [448100.0, 6255500.0]]))
     assert slack.tolist() == pytest.approx([-400.0, 100.0])
     task = task_of(site, count=2)
-    for item in place(task, small_grid(task)).ranked:
+    for item in place(task, small_grid(task), most=2).ranked:
         assert np.all(area_slack_m(site, item.positions_m) >= 0)
 
 
@@ -194,7 +217,9 @@ def test_allowed_ground_comes_from_a_file_in_another_crs(tmp_path):
     geopandas = pytest.importorskip("geopandas")
     shapely = pytest.importorskip("shapely")
     square = shapely.box(447000, 6255000, 448000, 6256000)
-    geopandas.GeoDataFrame(geometry=[square], crs="EPSG:32632").to_crs("EPSG:25833").to_file(tmp_path / "land.gpkg")
+    geopandas.GeoDataFrame(geometry=[square], crs="EPSG:32632").to_crs("EPSG:25833").to_file(
+        tmp_path / "land.gpkg"
+    )
     site = parse_site(SITE + "areas: {allowed: [land.gpkg]}", folder=tmp_path)
     slack = area_slack_m(site, np.array([[447500.0, 6255400.0], [448100.0, 6255500.0]]))
     assert slack == pytest.approx([400.0, -100.0], abs=0.5)
@@ -204,6 +229,10 @@ def test_a_soft_cost_moves_the_lidar_towards_what_is_wanted_near():
     task = task_of(parse_site(SITE), fixed=("one",))
     grid = small_grid(task)
     corner = np.array([449500.0, 6257500.0])
-    free = place(task, grid).ranked[0].positions_m[0, :2]
-    near = place(task, grid, cost=lambda spots: 1e-3 * np.hypot(*(spots - corner).T)).ranked[0].positions_m[0, :2]
+    free = place(task, grid, most=1).ranked[0].positions_m[0, :2]
+    near = (
+        place(task, grid, cost=lambda spots: 1e-3 * np.hypot(*(spots - corner).T))
+        .ranked[0]
+        .positions_m[0, :2]
+    )
     assert np.hypot(*(near - corner)) <= np.hypot(*(free - corner))

@@ -34,7 +34,9 @@ def ridged(height_m=100.0):
 
 def task_with(heights):
     task = task_of(parse_site(SITE), count=2)
-    return replace(task, terrain=HeightRaster(heights, WEST, NORTH, CELL, CELL, "above_sea_level"), head_height_m=2.0)
+    return replace(
+        task, terrain=HeightRaster(heights, WEST, NORTH, CELL, CELL, "above_sea_level"), head_height_m=2.0
+    )
 
 
 def test_no_lidar_is_put_behind_the_ridge():
@@ -44,14 +46,14 @@ def test_no_lidar_is_put_behind_the_ridge():
     behind = grid.places_m[:, 1] < 6255400.0
     assert not seen.allowed[0, behind].any()
     assert seen.allowed[0, ~behind].any()
-    for item in place(task, grid).ranked:
+    for item in place(task, grid, most=1).ranked:
         assert np.all(item.positions_m[:, 1] > 6255400.0)
 
 
 def test_how_far_the_head_must_be_raised_is_said_and_enough():
     task = task_with(ridged())
     grid = Grid(np.linspace(447000, 449000, 6), np.linspace(6255000, 6254400, 4))
-    with pytest.raises(InputError, match="terrain .* must give .* m .*--head-height") as caught:
+    with pytest.raises(InputError, match=r"terrain .* must give .* m .*--head-height") as caught:
         place(task, grid)
     needed = float(str(caught.value).split("must give ")[1].split(" m")[0])
     raised = replace(task, head_height_m=task.head_height_m + 1.02 * needed)
@@ -83,14 +85,20 @@ class TestFiles:
         return tmp_path / "dem.tif"
 
     def test_what_is_written_is_read_again(self, tif):
-        raster = load_terrain(tif, crs="EPSG:32632", height_datum="above_sea_level", declared_datum="above_sea_level")
+        raster = load_terrain(
+            tif, crs="EPSG:32632", height_datum="above_sea_level", declared_datum="above_sea_level"
+        )
         assert abs(float(raster.heights_m(447000.0, 6257000.0)) - (100 + 10 - 20)) < 0.01
 
     def test_another_crs_is_transformed(self, tif):
         from pyproj import Transformer
 
-        raster = load_terrain(tif, crs="EPSG:25833", height_datum="above_sea_level", declared_datum="above_sea_level")
-        east, north = Transformer.from_crs("EPSG:32632", "EPSG:25833", always_xy=True).transform(447500.0, 6256500.0)
+        raster = load_terrain(
+            tif, crs="EPSG:25833", height_datum="above_sea_level", declared_datum="above_sea_level"
+        )
+        east, north = Transformer.from_crs("EPSG:32632", "EPSG:25833", always_xy=True).transform(
+            447500.0, 6256500.0
+        )
         assert abs(float(raster.heights_m(east, north)) - (100 + 15 - 30)) < 0.5
 
     def test_an_unstated_datum_is_refused(self, tif):
@@ -126,3 +134,36 @@ class TestFiles:
         (tmp_path / "no.tif").write_text("no", encoding="utf-8")
         with pytest.raises(InputError, match="cannot be read as a raster"):
             load_terrain(tmp_path / "no.tif", crs="EPSG:32632", height_datum="ellipsoidal")
+
+
+def test_the_command_places_on_a_terrain_and_writes_everything(tmp_path, capsys):
+    """CSV, GeoPackage, GeoTIFF and two figures; the JSON says what the files are."""
+    import json
+
+    rasterio = pytest.importorskip("rasterio")
+    from planner.cli import run
+
+    east, north = WEST + CELL * (np.arange(80) + 0.5), NORTH - CELL * (np.arange(80) + 0.5)
+    write_geotiff(tmp_path / "dem.tif", {"height": ridged()}, east, north, "EPSG:32632")
+    terrain = "terrain: {file: dem.tif, height_datum: above_sea_level}\n"
+    (tmp_path / "site.yaml").write_text(SITE + terrain, encoding="utf-8")
+    out = tmp_path / "out"
+    assert (
+        run(["place", str(tmp_path / "site.yaml"), "--grid", "10", "--out", str(out), "--json", "--quiet"])
+        == 0
+    )
+    told = json.loads(capsys.readouterr().out)
+    assert [row["rank"] for row in told["places"]][:2] == [0, 1]
+    names = {
+        "places.csv",
+        "place-targets.csv",
+        "candidates.csv",
+        "places.gpkg",
+        "maps.tif",
+        "place.png",
+        "place-criteria.png",
+    }
+    assert {path.name for path in out.iterdir()} == names
+    with rasterio.open(out / "maps.tif") as maps:
+        assert maps.crs.to_epsg() == 32632
+        assert "error_vector" in maps.descriptions

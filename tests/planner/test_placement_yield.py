@@ -37,5 +37,5 @@ def test_days_needed_fill_the_emptiest_wanted_bin():
 
 
 def test_wind_without_a_distribution_is_said():
-    with pytest.raises(InputError, match="wind.weibull"):
+    with pytest.raises(InputError, match=r"wind\.weibull"):
         expected_yield(Site(name="a", crs="EPSG:32632"), 1.0)
