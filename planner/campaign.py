@@ -34,13 +34,13 @@ Limits = Annotated[tuple[Limit, Limit], AfterValidator(_rising)]
 class Columns(Noun):
     """How the columns of a plain CSV are called; a name that is left out is ours."""
 
-    names: dict[str, Name] = {}
+    names: dict[str, Name] = Field(default_factory=dict)
     speed_positive: Literal["away", "toward"] = "away"
     separator: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Literal[".", ","] = "."
     time_unit: Literal["iso", "unix_s", "labview_s"] = "iso"
-    factors: dict[str, Number] = {}
-    constants: dict[str, Number] = {}
+    factors: dict[str, Number] = Field(default_factory=dict)
+    constants: dict[str, Number] = Field(default_factory=dict)
 
 
 class Offsets(Noun):
@@ -60,7 +60,9 @@ class Filters(Noun):
     automatic: Literal["auto", "on", "off"] = "auto"  # auto: where a limit is missing
     window_s: Positive = 600.0  # of the automatic filter
     distance: Positive = 5.0  # robust standard deviations
-    ray_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0  # of a scan's rays; 1 drops every partial scan
+    ray_share: Annotated[float, Field(strict=True, gt=0, le=1)] = (
+        1.0  # of a scan's rays; 1 drops every partial scan
+    )
     residual_std_mps: Positive | None = None  # largest
     r_squared: Annotated[float, Field(strict=True, le=1)] | None = None  # smallest
     reduced_chi2: Positive | None = None  # largest
@@ -72,7 +74,9 @@ class RayInput(Noun):
 
     scan: Name
     kind: Kind = "auto"
-    path: Annotated[str, Field(min_length=1)] | None = None  # a file, a folder, or a pattern such as rays/WS_S*.csv
+    path: Annotated[str, Field(min_length=1)] | None = (
+        None  # a file, a folder, or a pattern such as rays/WS_S*.csv
+    )
     url: Annotated[str, Field(min_length=1)] | None = None  # of a database
     scenarios: tuple[Annotated[int, Field(strict=True)], ...] | None = None  # of a database: these only
     instrument: Name | None = None  # of a store that holds several
@@ -99,7 +103,8 @@ def _which_tag(value: object) -> str:
 
 
 Directions = Annotated[
-    Annotated[Literal["site", "all"], Tag("<word>")] | Annotated[Sectors, Field(min_length=1), Tag("<pairs>")],
+    Annotated[Literal["site", "all"], Tag("<word>")]
+    | Annotated[Sectors, Field(min_length=1), Tag("<pairs>")],
     Discriminator(_which_tag),
 ]
 
@@ -155,7 +160,9 @@ class Campaign(Noun):
     site: Path
     inputs: Annotated[tuple[RayInput, ...], Field(min_length=1)]
     pairs: tuple[Annotated[PairInput, BeforeValidator(_text_of_pair)], ...] = ()
-    sizes_deg: Annotated[tuple[Size, ...], Field(min_length=1)] | None = None  # default: the scan's and the usual smaller ones
+    sizes_deg: Annotated[tuple[Size, ...], Field(min_length=1)] | None = (
+        None  # default: the scan's and the usual smaller ones
+    )
     columns: Literal[2, 3] = 2  # of the fit: u and v, or w too
     filters: Filters = Filters()
     selection: Selection = Selection()

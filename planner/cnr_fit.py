@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.angles import difference_deg
+from geometry.beams import beam_to
 from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
@@ -128,7 +129,10 @@ def fit_head(
         raise InputError("no offsets from these maps:\n  " + "\n  ".join(faults))
     before = places.mounting(chosen)
     fit = fit_mounting(
-        [item.sighting for item in mapped], start=before, solve=solve, head_std_m=chosen.uncertainty.position_m
+        [item.sighting for item in mapped],
+        start=before,
+        solve=solve,
+        head_std_m=chosen.uncertainty.position_m,
     )
     return HeadFit(chosen, before, tuple(mapped), fit, drifts(mapped))
 
@@ -149,7 +153,9 @@ def drifts(mapped: Sequence[Mapped]) -> tuple[Drift, ...]:
                 last.elevation_deg - first.elevation_deg,
                 last.range_m - first.range_m,
             )
-            told = [value if np.isfinite(std) else float("nan") for value, std in zip(moved, stds, strict=True)]
+            told = [
+                value if np.isfinite(std) else float("nan") for value, std in zip(moved, stds, strict=True)
+            ]
             found.append(Drift(name, len(times), *told, *stds))
     return tuple(found)
 
@@ -173,12 +179,18 @@ def site_keys(result: HeadFit) -> dict[str, float]:
 
 def _sighting(places: Places, lidar: Lidar, label: str, name: str, found: FoundTarget) -> Sighting:
     target, position = sought(places.site, name)
+    there = np.asarray(places.frame.enu_m(lidar.position, position))
+    range_m = found.range_m
+    if target.shape == "mast":  # met below its top: as far in plan, not along the beam
+        _, hit_deg = places.mounting(lidar).to_true(found.azimuth_deg, found.elevation_deg)
+        top_deg = beam_to(there).elevation_deg
+        range_m *= float(np.cos(np.deg2rad(hit_deg)) / np.cos(np.deg2rad(top_deg)))
     return Sighting(
         label,
-        np.asarray(places.frame.enu_m(lidar.position, position)),
+        there,
         found.azimuth_deg,
         found.elevation_deg,
-        found.range_m,
+        range_m,
         found.azimuth_std_deg,
         found.elevation_std_deg,
         found.range_std_m,

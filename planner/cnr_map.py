@@ -210,10 +210,10 @@ def _windows(
 def _line(middle: float, std: float, size: float, step: float, along: bool) -> FloatArray:
     """Angles of columns or rows [deg]; only a few where the target runs along them."""
     if along:
-        return middle + step * (np.arange(FEW) - FEW // 2)
+        return np.asarray(middle + step * (np.arange(FEW) - FEW // 2), dtype=np.float64)
     half = max(WINDOW_STDS * std + 0.5 * size + MARGIN_STEPS * step, 0.5 * LEAST_WIDTHS * size)
     count = int(np.ceil(half / step))
-    return middle + step * np.arange(-count, count + 1)
+    return np.asarray(middle + step * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def _coarse(
@@ -225,7 +225,7 @@ def _coarse(
     half = 180.0 if seen.azimuth_std_deg >= FULL_CIRCLE_STD_DEG else WINDOW_STDS * seen.azimuth_std_deg
     half = min(half, 180.0)
     count = int(np.ceil(half / step))
-    azimuth = seen.azimuth_head_deg + step * np.arange(-count, count + 1)
+    azimuth = np.asarray(seen.azimuth_head_deg + step * np.arange(-count, count + 1), dtype=np.float64)
     row = np.array([seen.elevation_head_deg - below])
     return _window(lidar, "coarse", azimuth, row, "rows", seconds)
 
@@ -269,7 +269,9 @@ def _gates(lidar: Lidar, seen: Expected, probe: Probe) -> tuple[Gates, list[str]
     count = 2 * int(np.ceil(half / GATE_M)) + 1
     most, notes = lidar.device.max_gates, []
     if most is not None and count > most:
-        notes.append(f"{count} gates of 1 m are wanted and the instrument has {most}: the range may be cut off")
+        notes.append(
+            f"{count} gates of 1 m are wanted and the instrument has {most}: the range may be cut off"
+        )
         count = most - (1 - most % 2)
     first = max(float(np.round(seen.range_head_m)) - GATE_M * (count // 2), 0.0)
     return Gates(first_m=first, spacing_m=GATE_M, count=count), notes

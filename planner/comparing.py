@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from geometry.angles import Sector, SectorSet
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import InputError
 from planner.campaign import Campaign, MastInput
 from planner.error_nouns import SizeError
@@ -28,6 +28,15 @@ from reconstruct.wind import uv_mps
 
 if TYPE_CHECKING:
     import pandas as pd
+
+FORESEEN = (
+    "slope",
+    "slope_std",
+    "residual_std_mps",
+    "mean10_speed_bias_mps",
+    "mean10_speed_std_mps",
+    "direction_residual_std_deg",
+)  # numbers of the prediction that stand in the table
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +62,10 @@ class Row(NamedTuple):
     plainly: DirectionFit  # as the study
     weibull: WeibullFit  # of the lidar's speeds
     predicted: SizeError | None
+
+    def foreseen(self, name: str) -> float | None:
+        """One predicted number; None where there is none."""
+        return None if self.predicted is None else self.predicted.values.get(name)  # noqa: PD011
 
 
 class Comparison(NamedTuple):
@@ -83,11 +96,17 @@ def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -
     """
     campaign = loaded.campaign
     if campaign.mast is None:
-        raise InputError("the campaign has no mast: give `mast: {path: ...}` with a CSV of its speed and direction")
+        raise InputError(
+            "the campaign has no mast: give `mast: {path: ...}` with a CSV of its speed and direction"
+        )
     plan = Plan(loaded.site)
     mast = mast_means(campaign.mast, campaign.averaging.compare_s)
     matched = matches(_means_table(campaign), mast, plan, campaign)
-    predicted = _predictions(Plan(loaded.site.model_copy(update={"fidelity": "all"})), campaign, tier) if predict else {}
+    predicted = (
+        _predictions(Plan(loaded.site.model_copy(update={"fidelity": "all"})), campaign, tier)
+        if predict
+        else {}
+    )
     rows = tuple(
         Row(
             each,
@@ -119,16 +138,22 @@ def mast_means(mast: MastInput, period_s: float) -> PeriodMeans:
         raise InputError(f"mast file {mast.path} cannot be read as CSV ({error})") from error
     if missing := [name for name in (mast.time, mast.speed, mast.direction) if name not in frame.columns]:
         have = ", ".join(map(str, frame.columns))
-        raise InputError(f"mast file {mast.path} has no column {', '.join(missing)}; it has {have}: give the names under `mast`")
+        raise InputError(
+            f"mast file {mast.path} has no column {', '.join(missing)}; it has {have}: give the names under `mast`"
+        )
     time = pd.to_datetime(frame[mast.time], utc=True, errors="coerce", format="ISO8601")
     stamps = time.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
     speed, angle = (_numbers(frame[name], mast) for name in (mast.speed, mast.direction))
     known = ~np.isnat(stamps)
     if np.count_nonzero(known) < 2:
-        raise InputError(f"mast file {mast.path} has fewer than two times in {mast.time}: they have to be ISO 8601, UTC")
+        raise InputError(
+            f"mast file {mast.path} has fewer than two times in {mast.time}: they have to be ISO 8601, UTC"
+        )
     interval_s = mast.interval_s or float(np.median(np.diff(np.sort(stamps[known])) / np.timedelta64(1, "s")))
     if interval_s > period_s + 1e-6:
-        raise InputError(f"mast file {mast.path} has means over {interval_s:g} s, longer than the {period_s:g} s to be compared")
+        raise InputError(
+            f"mast file {mast.path} has means over {interval_s:g} s, longer than the {period_s:g} s to be compared"
+        )
     middle_s = (0.5 if mast.stamp == "start" else -0.5) * interval_s + mast.clock_s
     u, v = uv_mps(speed, angle + mast.direction_offset_deg)
     return period_means(stamps[known], u[known], v[known], period_s=period_s, shift_s=middle_s)
@@ -137,12 +162,17 @@ def mast_means(mast: MastInput, period_s: float) -> PeriodMeans:
 def matches(table: "pd.DataFrame", mast: PeriodMeans, plan: Plan, campaign: Campaign) -> tuple[Matched, ...]:
     """For every scan and size the periods that count, with counts of what each condition took."""
     found = []
-    for (scan, sector_deg), part in table.groupby(["scan", "sector_deg"], sort=False, dropna=False):
+    for (scan, sector), part in table.groupby(["scan", "sector_deg"], sort=False, dropna=False):
         time = part["time_utc"].to_numpy().astype("datetime64[ns]")
         shared, here, there = np.intersect1d(time, mast.time_utc, return_indices=True)
-        size = None if np.isnan(sector_deg) else float(sector_deg)
+        sector_deg = float(str(sector))
+        size = None if np.isnan(sector_deg) else sector_deg
         kept, steps = _counting(
-            part["availability"].to_numpy(dtype=float)[here], mast.at(there), _allowed(plan, str(scan), campaign), plan, campaign
+            part["availability"].to_numpy(dtype=float)[here],
+            mast.at(there),
+            _allowed(plan, str(scan), campaign),
+            plan,
+            campaign,
         )
         steps = (Step("with the mast", len(time), len(shared), "periods"), *steps)
         lidar = part.iloc[here]
@@ -159,8 +189,12 @@ def matches(table: "pd.DataFrame", mast: PeriodMeans, plan: Plan, campaign: Camp
             )
         )
     if not any(len(each.time_utc) for each in found):
-        told = "; ".join(f"{each.scan}: " + ", ".join(f"{s.name} {s.after}" for s in each.steps) for each in found[:3])
-        raise InputError(f"no period is left to compare ({told}): check the clocks, `selection` and the mast's times")
+        told = "; ".join(
+            f"{each.scan}: " + ", ".join(f"{s.name} {s.after}" for s in each.steps) for each in found[:3]
+        )
+        raise InputError(
+            f"no period is left to compare ({told}): check the clocks, `selection` and the mast's times"
+        )
     return tuple(found)
 
 
@@ -170,12 +204,15 @@ def table_rows(comparison: Comparison) -> list[dict[str, object]]:
     for row in comparison.rows:
         told: dict[str, object] = {"scan": row.matched.scan, "sector_deg": row.matched.sector_deg}
         told |= row.speed._asdict()
-        told |= {f"direction_{name}": value for name, value in row.direction._asdict().items() if name != "pairs"}
-        told |= {f"direction_plain_{name}": getattr(row.plainly, name) for name in ("slope", "intercept_deg", "r_squared")}
+        told |= {
+            f"direction_{name}": value for name, value in row.direction._asdict().items() if name != "pairs"
+        }
+        told |= {
+            f"direction_plain_{name}": getattr(row.plainly, name)
+            for name in ("slope", "intercept_deg", "r_squared")
+        }
         told |= {"weibull_scale_mps": row.weibull.scale_mps, "weibull_shape": row.weibull.shape}
-        values = {} if row.predicted is None else row.predicted.values
-        for name in ("slope", "slope_std", "residual_std_mps", "mean10_speed_bias_mps", "mean10_speed_std_mps", "direction_residual_std_deg"):
-            told[f"predicted_{name}"] = values.get(name)
+        told |= {f"predicted_{name}": row.foreseen(name) for name in FORESEEN}
         rows.append(told)
     return rows
 
@@ -198,7 +235,7 @@ def _means_table(campaign: Campaign) -> "pd.DataFrame":
 
 def _counting(
     availability: FloatArray, mast: PeriodMeans, allowed: SectorSet, plan: Plan, campaign: Campaign
-) -> tuple[np.ndarray, tuple[Step, ...]]:  # type: ignore[type-arg]
+) -> tuple[BoolArray, tuple[Step, ...]]:
     """Which of the shared periods count: by availability, the mast's direction and the mast's speed."""
     chosen = campaign.selection
     speed = chosen.speed_mps or (None, None)

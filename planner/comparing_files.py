@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.analysis import file_name
+from planner.analysis_files import file_name
 from planner.comparing import Comparison, Row, table_rows
 from planner.output import output_folder
 
@@ -53,7 +53,9 @@ def _figures(comparison: Comparison, title: str) -> Iterator[tuple[str, bytes]]:
     from planner.figures.comparison import LEAST_PERIODS, by_direction, per_size, scatter, time_series, wind
 
     for scan in dict.fromkeys(row.matched.scan for row in comparison.rows):
-        rows = [row for row in comparison.rows if row.matched.scan == scan and row.speed.pairs >= LEAST_PERIODS]
+        rows = [
+            row for row in comparison.rows if row.matched.scan == scan and row.speed.pairs >= LEAST_PERIODS
+        ]
         if not rows:
             continue
         name, heading = file_name(scan), f"{title}: {scan}"
@@ -61,7 +63,10 @@ def _figures(comparison: Comparison, title: str) -> Iterator[tuple[str, bytes]]:
         for one, row in zip(series, rows, strict=True):
             size = "" if row.matched.sector_deg is None else f"_{row.matched.sector_deg:g}"
             yield f"scatter_{name}{size}.png", scatter(one, title=heading)
-        yield f"time_{name}.png", time_series(series if len(series) < 3 else [series[0], series[-1]], title=heading)
+        yield (
+            f"time_{name}.png",
+            time_series(series if len(series) < 3 else [series[0], series[-1]], title=heading),
+        )
         yield f"direction_{name}.png", by_direction(series[0], title=heading)
         yield f"wind_{name}.png", wind(series[0], title=heading)
         if len(rows) > 1:
@@ -73,14 +78,16 @@ def _series(row: Row) -> "Series":
 
     one = row.matched
     label = "whole" if one.sector_deg is None else f"{one.sector_deg:g}°"
-    return Series(label, one.time_utc, one.lidar_mps, one.lidar_deg, one.mast_mps, one.mast_deg, row.speed.slope)
+    return Series(
+        label, one.time_utc, one.lidar_mps, one.lidar_deg, one.mast_mps, one.mast_deg, row.speed.slope
+    )
 
 
 def _curve(rows: list[Row]) -> "SizeCurve":
     from planner.figures.comparison import SizeCurve
 
     def predicted(name: str) -> "FloatArray":
-        values = [None if row.predicted is None else row.predicted.values.get(name) for row in rows]
+        values = [row.foreseen(name) for row in rows]
         return np.array([np.nan if value is None else value for value in values])
 
     return SizeCurve(

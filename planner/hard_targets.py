@@ -62,7 +62,7 @@ def sought(site: Site, name: str) -> tuple[HardTarget, Position]:
     for target, position in _undeclared(site):
         if target.name == name:
             return target, position
-    known = [item.name for item in (*site.hard_targets, *site.masts, *site.turbines)]
+    known = [item.name for item in site.hard_targets] + [item.name for item, _ in _undeclared(site)]
     raise InputError(
         f"no hard target, mast or turbine is called '{name}'; allowed: {', '.join(known) or 'none is declared'}"
     )
@@ -92,7 +92,12 @@ def _undeclared(site: Site) -> Iterator[tuple[HardTarget, Position]]:
 
 
 def expected(
-    places: Places, lidar: Lidar, position: Position, uncertainty_m: float, *, heading_std_deg: float | None = None
+    places: Places,
+    lidar: Lidar,
+    position: Position,
+    uncertainty_m: float,
+    *,
+    heading_std_deg: float | None = None,
 ) -> Expected:
     """Where to look for a target, and how far off it may be.
 
@@ -139,7 +144,9 @@ def candidates(places: Places, lidar: Lidar) -> list[Sighting]:
     site, device = places.site, lidar.device
     declared = [(item, site.target_position_m(item)) for item in site.hard_targets]
     tops = [item for item in _undeclared(site) if item[0].name not in {target.on for target, _ in declared}]
-    fixed = [item for item in neighbours(places, lidar) if item.part != "rotor"]  # which hides it at times only
+    fixed = [
+        item for item in neighbours(places, lidar) if item.part != "rotor"
+    ]  # which hides it at times only
     found = []
     for target, position in (*declared, *tops):
         seen = expected(places, lidar, position, target.uncertainty_m)

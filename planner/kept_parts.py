@@ -54,10 +54,14 @@ def write_kept(place: Path, mark: str, kept: Kept) -> None:
     arrays |= {f"fast {name}": values for name, values in part.fast.items()}
     arrays |= {f"series {name}": values for name, values in part.series._asdict().items()}
     for number, sums in enumerate(part.sums.values()):
-        arrays |= {f"sums {number} {field.name}": np.asarray(getattr(sums, field.name)) for field in fields(sums)}
+        arrays |= {
+            f"sums {number} {field.name}": np.asarray(getattr(sums, field.name)) for field in fields(sums)
+        }
     if kept.pending is not None:
         rays = kept.pending
-        arrays |= {f"pending {name}": values for name, values in {**rays.ray_fields(), **rays.gate_fields()}.items()}
+        arrays |= {
+            f"pending {name}": values for name, values in {**rays.ray_fields(), **rays.gate_fields()}.items()
+        }
         arrays["pending range_m"] = rays.range_m
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **arrays)

@@ -80,7 +80,9 @@ def _wanted_m(item: RayInput, layout: ScanLayout) -> float:
     """True range of the gate that is wanted [m]."""
     wanted_m = item.gate_m or layout.target_range_m
     if wanted_m is None:
-        raise InputError(f"scan '{layout.name}' has no target: give its input's gate_m, the range that is wanted")
+        raise InputError(
+            f"scan '{layout.name}' has no target: give its input's gate_m, the range that is wanted"
+        )
     return wanted_m
 
 
@@ -148,7 +150,9 @@ def _column_map(columns: Columns) -> ColumnMap:
 def _database(place: str | Path, item: RayInput, rays: int) -> Iterator[Records]:
     from reconstruct.formats.aas_database import aas_chunks
 
-    known = os.path.expandvars(place) if isinstance(place, str) else place  # a password need not stand in the file
+    known = (
+        os.path.expandvars(place) if isinstance(place, str) else place
+    )  # a password need not stand in the file
     for scenario in item.scenarios or (None,):
         yield from aas_chunks(known, _options(item, scenario), rays=rays)
 

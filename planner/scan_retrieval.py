@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.angles import difference_deg
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import InputError
 from planner.campaign import CNR_DB, Campaign, Filters
 from planner.error_curve import default_sizes
@@ -172,7 +172,8 @@ def filter_rays(
     agreement : Agreement
         Of the automatic filter with the usual limits of CNR, on the rays that came; zeros where it did not run.
     """
-    speed, steps = grid.radial_speed_mps, []
+    speed = grid.radial_speed_mps
+    steps: list[Step] = []
     cnr = np.where(np.isfinite(speed), grid.cnr_db, np.nan)
     done: Filtered
     if filters.cnr_db is not None:
@@ -246,7 +247,10 @@ def _fit(
 
 
 def wind_table(
-    time_utc: TimeArray, fit: Retrieval, sector_deg: float, left: np.ndarray  # type: ignore[type-arg]
+    time_utc: TimeArray,
+    fit: Retrieval,
+    sector_deg: float,
+    left: BoolArray,
 ) -> dict[str, FloatArray | TimeArray]:
     """Columns of the table of single scans."""
     wind, covariance = fit.wind_mps[left], fit.covariance_m2s2[left]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -148,14 +148,20 @@ def campaign_parts(campaign: Virtual, plan: Plan, options: Options) -> Iterator[
     """Fly a virtual campaign, period by period."""
     start = np.datetime64(options.start_utc, "ns")
     flown = fly(
-        campaign.scans, campaign.states, turbulence=turbulence(plan.site), seed=options.seed, settings=options.settings
+        campaign.scans,
+        campaign.states,
+        turbulence=turbulence(plan.site),
+        seed=options.seed,
+        settings=options.settings,
     )
     rng = np.random.default_rng([options.seed, 3])
     for period in flown:
         begin = start + np.timedelta64(round(period.index * campaign.periods_s * 1e9), "ns")
         records = {
             layout.name: _records(plan, layout, scan.rays, speeds, begin, options, rng)
-            for layout, scan, speeds in zip(campaign.layouts, campaign.scans, period.radial_speed_mps, strict=True)
+            for layout, scan, speeds in zip(
+                campaign.layouts, campaign.scans, period.radial_speed_mps, strict=True
+            )
         }
         yield Part(records, _mast(period, begin, campaign.periods_s), period.state)
 
@@ -254,7 +260,9 @@ def _records(
     order = np.argsort(seconds, kind="stable")
     ray = np.tile(np.arange(rays.count), len(speeds))[order]
     azimuth, elevation = layout.mounting.to_head(layout.scan.azimuth_deg, layout.scan.elevation_deg)
-    gate_m = float(layout.mounting.head_range_m(layout.measured_range_m(layout.range_to_m(layout.targets[0]))))
+    gate_m = float(
+        layout.mounting.head_range_m(layout.measured_range_m(layout.range_to_m(layout.targets[0])))
+    )
     measured, cnr = _with_noise(plan, layout, speeds.ravel()[order], options.lost_share, rng)
     return Records(
         time_utc=begin + (seconds[order] * 1e9).round().astype("timedelta64[ns]"),
@@ -292,11 +300,11 @@ def _mast(period: Flown, begin: np.datetime64, period_s: float) -> MastSamples:
 def joined(parts: Sequence[Records]) -> Records:
     """Consecutive records of one scan as one."""
     first = parts[0]
-    arrays = {
+    arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in (*first.ray_fields(), *first.gate_fields())
     }
     azimuth, elevation = arrays["azimuth_deg"], arrays["elevation_deg"]
-    still = np.ptp(azimuth) + np.ptp(elevation) == 0  # every ray of a stare is a pass, so that it can be cut anywhere
+    still = np.ptp(azimuth) + np.ptp(elevation) == 0  # every ray of a stare is a pass: it can be cut anywhere
     arrays["sweep_id"] = np.arange(len(azimuth)) if still else sweep_ids(azimuth, elevation)
     return replace(first, **arrays)

@@ -150,7 +150,9 @@ class Terrain(Noun):
     """A height model of the ground."""
 
     file: Path
-    height_datum: Literal["above_sea_level", "ellipsoidal"] | None = None  # where the file itself does not say
+    height_datum: Literal["above_sea_level", "ellipsoidal"] | None = (
+        None  # where the file itself does not say
+    )
     surface: Path | None = None  # heights of canopy and buildings above the ground, on the same cells
 
 

@@ -45,7 +45,9 @@ class Signal(Noun):
     range_m: Positive
     pulse_ns: Positive | None = None  # with which it was seen; default: the scan's own
     extinction_per_m: NonNegative = 1e-4  # clear lowland air, 40 km visibility
-    least_cnr_db: Number = -25.0  # below it a ray is thrown away; the usual filter of the reference study's scanners
+    least_cnr_db: Number = (
+        -25.0
+    )  # below it a ray is thrown away; the usual filter of the reference study's scanners
     spread_db: Positive = 3.0  # of the CNR from hour to hour
 
 
@@ -88,7 +90,9 @@ class Mast(Noun):
     position: Position
     height_m: Positive
     width_m: Positive = 1.0
-    speed_uncertainty_mps: NonNegative | None = None  # of its ten-minute means (k = 1), for the uncertainty budget
+    speed_uncertainty_mps: NonNegative | None = (
+        None  # of its ten-minute means (k = 1), for the uncertainty budget
+    )
     direction_uncertainty_deg: NonNegative | None = None
 
 

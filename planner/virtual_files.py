@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.errors import InputError
-from planner.analysis import file_name
+from planner.analysis_files import file_name
 from planner.output import output_folder
 from planner.plan import Plan
 from planner.simulation import (
@@ -169,8 +169,8 @@ class _RayWriter:
         return f"kind: database, {where}, scenarios: {self._scenarios[scan]}"
 
     def _write_scenario(self, scan: str, records: Records) -> None:
-        from reconstruct.formats.aas_write import write_aas
         from reconstruct.formats.aas_scenarios import next_scenario
+        from reconstruct.formats.aas_write import write_aas
 
         place = self._folder / DATABASE if self._url is None else os.path.expandvars(self._url)
         number = next_scenario(place)

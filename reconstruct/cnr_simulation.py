@@ -89,8 +89,9 @@ def simulate_cnr_map(
     jitter = rng.normal(0.0, signal.jitter_deg, (2, azimuth.size))
     wider = 1.0 / np.cos(np.deg2rad(elevation))
     beams = unit_vector(*mounting.to_true(azimuth + jitter[0] * wider, elevation + jitter[1]))
-    hit = _hit_share(beams, target, shape, size_m, beam_width_m)
-    power = _power(hit, mounting.true_range_m(gates) - float(np.linalg.norm(target)), probe, signal, rng)
+    hit, reach_m = _met(beams, target, shape, size_m, beam_width_m)
+    behind_m = mounting.true_range_m(gates) - reach_m[:, None]
+    power = _power(hit, behind_m, probe, signal, rng)
     noise_db = rng.normal(0.0, signal.gate_noise_db, power.shape)
     return CnrMap(azimuth, elevation, gates, 10.0 * np.log10(power) + noise_db)
 
@@ -99,9 +100,9 @@ def _power(
     hit: FloatArray, behind_m: FloatArray, probe: Probe, signal: Signal, rng: np.random.Generator
 ) -> FloatArray:
     """Linear carrier-to-noise ratio (ray, gate): the air, dimmed behind the target, and the target."""
-    gate_m = float(np.median(np.diff(behind_m)))
+    gate_m = float(np.median(np.diff(behind_m[0])))
     within = max(1, round(probe.length_m / gate_m))
-    white = rng.normal(0.0, 1.0, (hit.size, behind_m.size + within))
+    white = rng.normal(0.0, 1.0, (hit.size, behind_m.shape[1] + within))
     sums = np.cumsum(white, axis=1)
     shared = (sums[:, within:] - sums[:, :-within]) / np.sqrt(within)
     air = 10.0 ** (0.1 * (signal.air_db + signal.air_noise_db * shared))
@@ -109,14 +110,15 @@ def _power(
     passed = np.cumsum(probe.weight(fine_m))
     dimmed = 1.0 - hit[:, None] * np.interp(behind_m, fine_m, passed / passed[-1])
     speckle = np.maximum(rng.normal(1.0, signal.speckle, hit.size), 0.0)
-    peak = probe.weight(behind_m) / probe.weight(np.zeros(1))
+    shape = probe.weight(fine_m) / probe.weight(np.zeros(1))
+    peak = np.interp(behind_m, fine_m, shape, left=0.0, right=0.0)
     return np.asarray(air * dimmed + 10.0 ** (0.1 * signal.target_db) * (hit * speckle)[:, None] * peak)
 
 
-def _hit_share(
+def _met(
     beams: FloatArray, target: FloatArray, shape: Shape, size_m: float, beam_width_m: float
-) -> FloatArray:
-    """Share of each beam's bundle (ray,) that meets the bar."""
+) -> tuple[FloatArray, FloatArray]:
+    """Share of each beam's bundle (ray,) that meets the bar, and the slant range (ray,) at which [m]."""
     level = np.array([target[0], target[1], 0.0]) / np.hypot(target[0], target[1])
     right = np.array([level[1], -level[0], 0.0])
     reach = float(np.hypot(target[0], target[1])) / (beams @ level)  # to the upright plane of the target
@@ -128,5 +130,7 @@ def _hit_share(
     above = (met[:, 2] - target[2])[:, None] + nodes
     strip = np.abs(above if shape == "boom" else across) <= 0.5 * size_m
     below = above <= 0.0 if shape == "tip" else np.ones_like(above, dtype=bool)
-    first = (strip * weights).sum(axis=1)
-    return np.asarray(first * (below * weights).sum(axis=1)) if shape == "tip" else np.asarray(first)
+    share = (strip * weights).sum(axis=1)
+    if shape == "tip":
+        share = share * (below * weights).sum(axis=1)
+    return np.asarray(share), np.asarray(reach)

@@ -38,7 +38,9 @@ MAX_CELLS = 20_000_000  # 320 MB of field and 720 MB while it is made
 CELLS_PER_LENGTH = 12  # at 170 m: cells of 14 m, a third of a 43 m probe; 11 % of the variance is smaller
 COARSEST_CELLS_PER_LENGTH = 5  # beyond that a fifth of the variance would be added as noise
 COARSEST_CELL_M = 40.0  # about a probe: what is smaller may pass for independent from ray to ray
-MARGIN_LENGTHS = 7.0  # from the last sample to the first in the next copy of the box: correlation -.005
+# From the last sample to the first in the next copy of the box, downwind, left, up. Copies abreast have the
+# negative correlation of g: at 7 lengths -.005 each, which took 5 % from the wind that a wide scan averages.
+MARGIN_LENGTHS = np.array([7.0, 10.0, 10.0])
 _LONG_WAVES = 2.0  # wavenumber times L under which the box is too small for a wave
 _SUBGRID_SPAN = 1e4
 _SUBGRID_NODES = 24
@@ -147,7 +149,7 @@ def synthesise(
     --------
     >>> field = synthesise(Turbulence(0.1, 50.0), np.zeros(3), rng=np.random.default_rng(1))
     >>> field.cells.shape, round(float(field.subgrid[0, 0]), 3)
-    ((84, 84, 84, 4), 0.106)
+    ((84, 120, 120, 4), 0.106)
     """
     spacing = _spacing_m(turbulence.length_m, np.asarray(extent_m), spacing_m)
     counts = _counts(np.asarray(extent_m) + MARGIN_LENGTHS * turbulence.length_m, spacing)

@@ -263,7 +263,9 @@ def goodness(fit: Retrieval, radial_speed_mps: FloatArray, *, noise_mps: float) 
     (1.0, 0.0)
     """
     if not noise_mps > 0:
-        raise InputError(f"a noise of {noise_mps:g} m/s came: give the standard deviation of a radial speed, above 0")
+        raise InputError(
+            f"a noise of {noise_mps:g} m/s came: give the standard deviation of a radial speed, above 0"
+        )
     columns = fit.wind_mps.shape[-1]
     known = np.isfinite(radial_speed_mps)
     rays = np.count_nonzero(known, axis=-1)

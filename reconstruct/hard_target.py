@@ -21,8 +21,12 @@ BEAM_WIDTH_M = 0.1
 # Rays point a little aside of what the encoder says: the resolution of the WindScanner's head.
 JITTER_DEG = 0.001
 
-# How well the target's size and the beam's width are taken to be known (k = 1): type B, ASSUMED.
-SIZE_SHARE = 0.1
+# A target may look wider or narrower than stated (a lattice, a flange): what fits best is taken.
+WIDTHS = 9  # and as many more of up to a step's difference, weighed by their likelihood
+LEAST_WIDTH_SHARE = 0.3
+WIDTH_SHARES = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 1.6)
+
+# How well the width of the beam is taken to be known (k = 1): type B, ASSUMED.
 BEAM_SHARE = 0.3
 
 BRIGHT_NOISES = 8.0  # a ray hits something when it stands so many standard deviations above the others
@@ -32,6 +36,8 @@ CLEAR_STEPS = 2.0  # as far from the first one's silhouette [steps]
 
 SOME_RAYS = 2000  # give a median to 3 % of the scatter
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
+TAIL = 6.0  # standard deviations of the beam beyond which it is dark: 1e-9
 
 CANDIDATES = 41  # centres tried side by side in each direction
 REFINEMENTS = 3
@@ -71,7 +77,9 @@ class _Fit(NamedTuple):
     up_deg: FloatArray  # (e,)
     likelihood: FloatArray  # (a, e) sums to 1
     height: float  # power of a full hit, at the best centre
-    hit: FloatArray  # (ray,) at the mean centre
+    hit: FloatArray  # (ray,) at the best centre
+    gain: float  # fall of the weighted squares below those of no target, at the best centre
+    widened: float  # how much more the edges scatter than the weights say
 
 
 def find_target(
@@ -107,10 +115,11 @@ def find_target(
     Above each gate's median the power of every ray is matched with the probe's shape; at the range where most
     comes back, the silhouette (strip, blurred by the beam) is laid over the image at many centres. The
     likelihood of each follows from weighted squares, the height of the plateau being fitted; centre and
-    uncertainty are its mean and standard deviation, so that an edge between two columns of rays is as unsure
+    uncertainty are its mean and standard deviation over centres and widths (0.6 to 1.6 times the stated
+    one), so that an edge between two columns of rays is as unsure
     as it is. Weights: the scatter of rays that miss, and of those that hit. What the edges scatter more than
     that widens the uncertainty (sandwich covariance: White 1980, doi:10.2307/1912934), and so does what the
-    centre moves by if the target is 10 % larger, or the beam 30 % wider, than stated.
+    centre moves by if the beam is 30 % wider or narrower than stated.
 
     Examples
     --------
@@ -127,7 +136,7 @@ def find_target(
     azimuth, elevation = cnr_map.middle_deg
     near_m = float(cnr_map.range_m[image.gate])
     look = _blurred(look_of(shape, size_m, beam_width_m, near_m, elevation), JITTER_DEG, JITTER_DEG)
-    fit, weight = _fitted(cnr_map, image, shape, look)
+    fit, weight, look = _fitted(cnr_map, image, shape, look)
     across, up = _centres(cnr_map, image, shape, look, fit, weight)
     _refuse_edges(cnr_map, image, shape, look, probe, across[0], up[0])
     _refuse_second(cnr_map, image, fit, probe, shape, look, across[0], up[0])
@@ -137,10 +146,13 @@ def find_target(
         up = (float(np.average(cnr_map.aside_deg[1], weights=fit.hit)), np.nan)
     if shape == "boom":
         across = (0.0, np.nan)
+    # an upright mast is met farther out, the steeper the ray: 0.1 m at 1 km between 4.7 and 4.8 degrees
+    steepness = np.cos(np.deg2rad(cnr_map.elevation_deg[on_target]))
+    nearer = 1.0 if shape == "boom" else float(steepness.mean() / np.cos(np.deg2rad(elevation + up[0])))
     return FoundTarget(
         azimuth_deg=float(wrap_360_deg(azimuth + across[0])),
         elevation_deg=elevation + up[0],
-        range_m=found.range_m,
+        range_m=found.range_m * nearer,
         azimuth_std_deg=across[1],
         elevation_std_deg=up[1],
         range_std_m=found.std_m,
@@ -203,19 +215,33 @@ def _centres(
     cnr_map: CnrMap, image: _Image, shape: Shape, look: Look, fit: _Fit, weight: FloatArray
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Centre and standard deviation across and up, with what target and beam may really be."""
-    shares_off = ((SIZE_SHARE, 0.0), (-SIZE_SHARE, 0.0), (0.0, BEAM_SHARE), (0.0, -BEAM_SHARE))
-    others = [
-        Look(look.width_deg * (1.0 + size), *(beam * (1.0 + wider) for beam in look[1:]))
-        for size, wider in shares_off
-    ]
     places = [_roomy(fit, axis, cnr_map.step_deg[axis]) for axis in (0, 1)]
-    tried = [_likelihood(image.power, weight, shape, other, *cnr_map.aside_deg, places) for other in others]
+    step = cnr_map.step_deg[1 if shape == "boom" else 0]
+    least = LEAST_WIDTH_SHARE * look.width_deg
+    widths = np.maximum(look.width_deg + step * np.linspace(-1.0, 1.0, WIDTHS), least)
+    looks = [look._replace(width_deg=float(width)) for width in widths]
+    mixed = _mixed(
+        [_likelihood(image.power, weight, shape, tried, *cnr_map.aside_deg, places) for tried in looks]
+    )
+    beams = [
+        Look(look.width_deg, *(beam * (1.0 + wider) for beam in look[1:]))
+        for wider in (BEAM_SHARE, -BEAM_SHARE)
+    ]
+    others = [_likelihood(image.power, weight, shape, beam, *cnr_map.aside_deg, places) for beam in beams]
     found = []
     for axis in (0, 1):
-        mean, std = _moments(fit, axis)
-        moved = [abs(_moments(other, axis)[0] - mean) for other in tried]
-        found.append((mean, float(np.linalg.norm((std, max(moved[:2]), max(moved[2:]))))))
+        mean, std = _moments(mixed, axis)
+        moved = 0.5 * (_moments(others[0], axis)[0] - _moments(others[1], axis)[0])
+        found.append((mean, float(np.hypot(std, moved))))
     return found[0], found[1]
+
+
+def _mixed(fits: list[_Fit]) -> _Fit:
+    """Centres whatever the width, each width as likely as its squares say: the best, with the mixture."""
+    best = max(fits, key=lambda fit: fit.gain)
+    shares_of = [np.exp(0.5 * (fit.gain - best.gain) / best.widened) / fit.likelihood.max() for fit in fits]
+    total = sum(share * fit.likelihood for share, fit in zip(shares_of, fits, strict=True))
+    return best._replace(likelihood=total / np.sum(total))
 
 
 def _roomy(fit: _Fit, axis: int, step: float) -> FloatArray:
@@ -225,8 +251,8 @@ def _roomy(fit: _Fit, axis: int, step: float) -> FloatArray:
     return np.linspace(mean - half, mean + half, CANDIDATES)
 
 
-def _fitted(cnr_map: CnrMap, image: _Image, shape: Shape, look: Look) -> tuple[_Fit, FloatArray]:
-    """Lay the silhouette over the image at ever finer centres."""
+def _fitted(cnr_map: CnrMap, image: _Image, shape: Shape, look: Look) -> tuple[_Fit, FloatArray, Look]:
+    """Lay the silhouette over the image at ever finer centres, as wide as fits best; with the weights used."""
     across, up = cnr_map.aside_deg
     steps = [max(step, 1e-6) for step in cnr_map.step_deg]
     bright = image.power > max(BRIGHT_NOISES * image.noise, 0.3 * float(np.quantile(image.power, 0.999)))
@@ -237,11 +263,16 @@ def _fitted(cnr_map: CnrMap, image: _Image, shape: Shape, look: Look) -> tuple[_
     ]
     weight = np.ones_like(image.power)
     fit = _likelihood(image.power, weight, shape, look, across, up, centres)
+    centres = [_closer(fit, axis, steps[axis]) for axis in (0, 1)]
+    looks = [look._replace(width_deg=look.width_deg * share) for share in WIDTH_SHARES]
+    fits = [_likelihood(image.power, weight, shape, tried, across, up, centres) for tried in looks]
+    best = max(range(len(fits)), key=lambda number: fits[number].gain)
+    look, fit = looks[best], fits[best]
     for _ in range(REFINEMENTS):
         weight = _weights(image, fit, shape, look, across, up, steps)
         centres = [_closer(fit, axis, steps[axis]) for axis in (0, 1)]
         fit = _likelihood(image.power, weight, shape, look, across, up, centres)
-    return fit, weight
+    return fit, weight, look
 
 
 def _likelihood(
@@ -254,18 +285,35 @@ def _likelihood(
     centres: list[FloatArray],
 ) -> _Fit:
     """Likelihood of every centre; the scatter of the edges decides how sharp it is."""
-    a = shares(shape, look, across[None, :] - centres[0][:, None], np.zeros((1, 1)))[0]
-    e = shares(shape, look, np.zeros((1, 1)), up[None, :] - centres[1][:, None])[1]
-    a, e = (np.broadcast_to(part, (CANDIDATES, power.size)) for part in (a, e))
-    met = (a * (weight * power)) @ e.T
-    own = np.maximum((a**2 * weight) @ (e**2).T, 1e-300)
+    near = _near(shape, look, across, up, centres)  # the others are missed whatever the centre
+    kept, weights = power[near], weight[near]
+    a = shares(shape, look, across[None, near] - centres[0][:, None], np.zeros((1, 1)))[0]
+    e = shares(shape, look, np.zeros((1, 1)), up[None, near] - centres[1][:, None])[1]
+    a, e = (np.broadcast_to(part, (CANDIDATES, kept.size)) for part in (a, e))
+    met = (a * (weights * kept)) @ e.T
+    own = np.maximum((a**2 * weights) @ (e**2).T, 1e-300)
     gain = np.where(met > 0, met**2 / own, 0.0)  # fall of the weighted squares below those of no target
     best = np.unravel_index(int(gain.argmax()), gain.shape)
     height = float(met[best] / own[best])
-    hit = a[best[0]] * e[best[1]]
-    widened = _widening(power - height * hit, weight, a, e, best)
+    hit = np.zeros_like(power)
+    hit[near] = a[best[0]] * e[best[1]]
+    widened = _widening(kept - height * hit[near], weights, a, e, best)
     likelihood = np.exp(0.5 * (gain - gain[best]) / widened)
-    return _Fit(centres[0], centres[1], likelihood / likelihood.sum(), height, hit)
+    return _Fit(
+        centres[0], centres[1], likelihood / likelihood.sum(), height, hit, float(gain[best]), widened
+    )
+
+
+def _near(
+    shape: Shape, look: Look, across: FloatArray, up: FloatArray, centres: list[FloatArray]
+) -> BoolArray:
+    """Rays (ray,) that some centre's silhouette reaches."""
+    half = 0.5 * look.width_deg
+    wide, high = (half + TAIL * beam for beam in look[1:])
+    beside = (across > centres[0].min() - wide) & (across < centres[0].max() + wide)
+    if shape == "boom":
+        return np.asarray((up > centres[1].min() - high) & (up < centres[1].max() + high))
+    return np.asarray(beside if shape == "mast" else beside & (up < centres[1].max() + TAIL * look[2]))
 
 
 def _widening(
@@ -318,7 +366,7 @@ def _closer(fit: _Fit, axis: int, step: float) -> FloatArray:
     mean, std = _moments(fit, axis)
     old = (fit.across_deg, fit.up_deg)[axis]
     cell = float(old[1] - old[0])
-    half = max(WIDE_STDS * std, 2.0 * cell, 1e-3 * step)
+    half = min(max(WIDE_STDS * std, 2.0 * cell, 1e-3 * step), 0.5 * float(old[-1] - old[0]))
     return np.linspace(mean - half, mean + half, CANDIDATES)
 
 
@@ -387,7 +435,8 @@ def _say_second(cnr_map: CnrMap, bright: BoolArray, gate: FloatArray) -> None:
         return
     middle = cnr_map.middle_deg
     azimuth, elevation = (
-        float(np.median(each[bright])) + centre for each, centre in zip(cnr_map.aside_deg, middle, strict=True)
+        float(np.median(each[bright])) + centre
+        for each, centre in zip(cnr_map.aside_deg, middle, strict=True)
     )
     range_m = float(np.median(cnr_map.range_m[np.asarray(gate)[bright].astype(np.intp)]))
     raise InputError(

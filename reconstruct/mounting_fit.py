@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from geometry.angles import difference_deg
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.beams import beam_to, unit_vector
 from geometry.errors import InputError
 from geometry.head import Mounting
@@ -163,7 +163,15 @@ def fit_mounting(
     residuals = tuple(
         _residual(item, mounting, head_std_m, number not in kept) for number, item in enumerate(sightings)
     )
-    return MountingFit(mounting, solve, np.linalg.inv(normal), range_std_m, residuals, chi_square, freedom)
+    return MountingFit(
+        mounting,
+        solve,
+        np.asarray(np.linalg.inv(normal), dtype=np.float64),
+        range_std_m,
+        residuals,
+        chi_square,
+        freedom,
+    )
 
 
 def _pointed(sightings: Sequence[Sighting], mounting: Mounting) -> FloatArray:
@@ -194,7 +202,7 @@ def _sides(item: Sighting) -> FloatArray:
 
 def _whitening(
     sightings: Sequence[Sighting], kept: list[int], head_std_m: float
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[IntArray, FloatArray]:
     """Places of the known angles in (target, 2), flat, and the Cholesky factor of their covariance [deg]."""
     items = [sightings[number] for number in kept]
     cosine = np.cos(np.deg2rad([float(beam_to(item.enu_m).elevation_deg) for item in items]))
@@ -209,7 +217,7 @@ def _whitening(
     known = np.flatnonzero(np.isfinite(measured.ravel()))
     if not np.all(np.diag(covariance)[known] > 0):
         raise InputError("a measured angle has no uncertainty: give a standard deviation greater than 0")
-    return known, np.linalg.cholesky(covariance[np.ix_(known, known)])
+    return known, np.asarray(np.linalg.cholesky(covariance[np.ix_(known, known)]))
 
 
 def _whitened(
@@ -217,12 +225,12 @@ def _whitened(
     items: list[Sighting],
     start: Mounting,
     solve: tuple[Angle, ...],
-    white: tuple[FloatArray, FloatArray],
+    white: tuple[IntArray, FloatArray],
 ) -> FloatArray:
     """Residuals in standard deviations, independent of each other."""
     mounting = replace(start, **dict(zip(solve, values.tolist(), strict=True)))
     known, factor = white
-    return np.linalg.solve(factor, _angles_left(items, mounting).ravel()[known])
+    return np.asarray(np.linalg.solve(factor, _angles_left(items, mounting).ravel()[known]), dtype=np.float64)
 
 
 def _solved(
@@ -242,7 +250,8 @@ def _solved(
     begin = begin + _turned(items, start, solve)
     robust = least_squares(_whitened, begin, args=arguments, loss="soft_l1", x_scale=0.1)
     exact = least_squares(_whitened, robust.x, args=arguments, x_scale=0.1, xtol=1e-12, ftol=1e-12)
-    return exact.x, exact.jac.T @ exact.jac, float(2.0 * exact.cost)
+    slopes = np.asarray(exact.jac, dtype=np.float64)
+    return np.asarray(exact.x), slopes.T @ slopes, float(2.0 * exact.cost)
 
 
 def _turned(items: list[Sighting], start: Mounting, solve: tuple[Angle, ...]) -> FloatArray:

@@ -138,7 +138,10 @@ def _columns(azimuth_deg: FloatArray, planned_deg: FloatArray, step_deg: float) 
     fine -= step_deg * round(fine / step_deg)
     shifts = fine + step_deg * np.arange(-len(planned_deg), len(planned_deg) + 1)
     shifts = shifts[np.argsort(np.abs(shifts), kind="stable")]  # of two as good the smaller
-    counts = [np.count_nonzero(np.abs(_nearest(sample, planned_deg + shift)[1]) <= 0.5 * step_deg) for shift in shifts]
+    counts = [
+        np.count_nonzero(np.abs(_nearest(sample, planned_deg + shift)[1]) <= 0.5 * step_deg)
+        for shift in shifts
+    ]
     offset = float(shifts[int(np.argmax(counts))])
     nearest, off = _nearest(azimuth_deg, planned_deg + offset)
     return np.where(np.abs(off) <= 0.5 * step_deg, nearest, -1), offset

@@ -129,7 +129,9 @@ def level_from_sea(
     azimuth, elevation, met, std = (each[known] for each in (azimuth, elevation, met, std))
     count = 2 + int(solve_offset) + int(height_std_m > 0)
     if met.size < count + 1:
-        raise InputError(f"{met.size} ranges to the sea came; needed: {count + 1} or more at different bearings")
+        raise InputError(
+            f"{met.size} ranges to the sea came; needed: {count + 1} or more at different bearings"
+        )
 
     def left(values: FloatArray) -> FloatArray:
         pitch, roll, offset, height = _unpacked(values, solve_offset, height_m, height_std_m > 0)
@@ -140,13 +142,14 @@ def level_from_sea(
 
     start = np.array([0.0, 0.0, *([0.0] if solve_offset else []), *([height_m] if height_std_m > 0 else [])])
     robust = least_squares(left, start, loss="soft_l1", x_scale="jac")
-    size = np.linalg.svd(robust.jac / np.linalg.norm(robust.jac, axis=0), compute_uv=False)
+    slopes = np.asarray(robust.jac, dtype=np.float64)
+    size = np.linalg.svd(slopes / np.linalg.norm(slopes, axis=0), compute_uv=False)
     if not size[-1] > 1e-3 * size[0]:
         raise InputError(
             "the ranges to the sea do not determine the tilt: measure at bearings around the lidar, and at two "
             "elevations where the elevation offset is asked for"
         )
-    covariance = np.linalg.inv(robust.jac.T @ robust.jac)
+    covariance = np.linalg.inv(slopes.T @ slopes)
     scale = max(1.0, float(np.median(np.abs(robust.fun)) / 0.6745) ** 2)  # ranges scatter more than they say
     std_of = iter(np.sqrt(np.diag(covariance) * scale).tolist())
     pitch, roll, offset, height = _unpacked(robust.x, solve_offset, height_m, height_std_m > 0)

@@ -17,9 +17,7 @@ class Look(NamedTuple):
     beam_elevation_deg: float
 
 
-def look_of(
-    shape: Shape, size_m: float, beam_width_m: float, range_m: float, elevation_deg: float
-) -> Look:
+def look_of(shape: Shape, size_m: float, beam_width_m: float, range_m: float, elevation_deg: float) -> Look:
     """Turn sizes at a target into angles.
 
     Parameters

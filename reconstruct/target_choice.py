@@ -73,10 +73,14 @@ def best_targets(
     """
     candidates = list(sightings)[:MAX_CANDIDATES]
     if not candidates or count < 1:
-        raise InputError(f"{count} of {len(candidates)} hard targets are to be chosen; allowed: 1 or more of 1 or more")
+        raise InputError(
+            f"{count} of {len(candidates)} hard targets are to be chosen; allowed: 1 or more of 1 or more"
+        )
     sets = list(combinations(range(len(candidates)), min(count, len(candidates))))
     stds = [
-        predicted_std_deg([candidates[place] for place in chosen], start=start, solve=solve, head_std_m=head_std_m)
+        predicted_std_deg(
+            [candidates[place] for place in chosen], start=start, solve=solve, head_std_m=head_std_m
+        )
         for chosen in sets
     ]
     best = min(range(len(sets)), key=lambda number: _rank(stds[number]))

@@ -236,7 +236,8 @@ def subgrid_std(rays: Rays, wind: WindState, turbulence: Turbulence, cut_per_m: 
     (`flight.subgrid_root`) and the others lie between them.
     """
     if rays.count <= FAN_KNOTS or np.ptp(rays.elevation_deg) > FAN_ELEVATION_DEG:
-        return np.sqrt(np.sum(np.square(subgrid_root(rays, wind, turbulence, cut_per_m)), axis=1))
+        root = subgrid_root(rays, wind, turbulence, cut_per_m)
+        return np.asarray(np.sqrt(np.sum(np.square(root), axis=1)))
     knots = np.unique(np.linspace(0, rays.count - 1, FAN_KNOTS).round().astype(np.intp))
     some = subgrid_root(rays_at(rays, knots), wind, turbulence, cut_per_m)
     variance = np.interp(np.arange(rays.count), knots, np.sum(np.square(some), axis=1))
@@ -245,7 +246,16 @@ def subgrid_std(rays: Rays, wind: WindState, turbulence: Turbulence, cut_per_m: 
 
 def rays_at(rays: Rays, index: IntArray) -> Rays:
     """Some rays of a scan, with its timing."""
-    per_ray = ("azimuth_deg", "elevation_deg", "range_m", "head_m", "lidar", "time_s", "duration_s", "swept_azimuth_deg")
+    per_ray = (
+        "azimuth_deg",
+        "elevation_deg",
+        "range_m",
+        "head_m",
+        "lidar",
+        "time_s",
+        "duration_s",
+        "swept_azimuth_deg",
+    )
     return replace(rays, **{name: getattr(rays, name)[index] for name in per_ray})
 
 

@@ -37,7 +37,7 @@ def asked(loaded: "Loaded") -> "Campaign":
 
 def _approved(item: "RayInput", campaign: "Campaign", plan: "Plan") -> "Filters":
     """The limits of one scan, asked for until they are approved."""
-    from planner.analysis import told
+    from planner.analysis_files import told
     from planner.scan_retrieval import filter_rays
 
     grid, rays = _first_rays(item, campaign, plan)
@@ -82,7 +82,7 @@ def _first_rays(item: "RayInput", campaign: "Campaign", plan: "Plan") -> "tuple[
 def _drawn(folder: Path, scan: str, what: str, grid: "ScanGrid", after: object) -> Path:
     import numpy as np
 
-    from planner.analysis import file_name
+    from planner.analysis_files import file_name
     from planner.figures.rays import rays
     from planner.output import write_bytes
 

@@ -26,7 +26,9 @@ HeadingOption = Annotated[
     float | None,
     typer.Option("--heading-std", metavar="DEG", help="How well the heading is known; 180 for not at all."),
 ]
-BeamOption = Annotated[float, typer.Option("--beam", metavar="M", help="Diameter of the beam at the target [m].")]
+BeamOption = Annotated[
+    float, typer.Option("--beam", metavar="M", help="Diameter of the beam at the target [m].")
+]
 PulseOption = Annotated[float | None, typer.Option("--pulse-ns", help="Pulse of the maps [ns].")]
 FftOption = Annotated[int | None, typer.Option("--fft-points", help="Samples of one gate of the maps.")]
 MapsArgument = Annotated[
@@ -36,7 +38,9 @@ MapsArgument = Annotated[
 SiteOption = Annotated[str, typer.Option("--site", metavar="SITE", help="Site file.")]
 SolveOption = Annotated[
     str | None,
-    typer.Option("--solve", metavar="NAME,...", help="Angles to solve for. [default: both offsets, pitch, roll]"),
+    typer.Option(
+        "--solve", metavar="NAME,...", help="Angles to solve for. [default: both offsets, pitch, roll]"
+    ),
 ]
 WriteOption = Annotated[bool, typer.Option("--write", help="Put the offsets into the site file.")]
 FiguresOption = Annotated[
@@ -47,7 +51,9 @@ FiguresOption = Annotated[
 def register(app: typer.Typer) -> None:
     """Add the group of two commands to the application."""
     group = typer.Typer(
-        name="cnr-map", help="CNR maps of hard targets: plan them, and fit offsets to them.", no_args_is_help=True
+        name="cnr-map",
+        help="CNR maps of hard targets: plan them, and fit offsets to them.",
+        no_args_is_help=True,
     )
     group.command("plan")(plan)
     group.command("fit")(fit)
@@ -127,9 +133,7 @@ def fit(
         raise InputError("--write needs a site file to write to, not standard input")
     places = load_plan(site).exact_places
     probe = map_probe(places.site.lidar(lidar), pulse_ns, fft_points)
-    result = fit_head(
-        places, lidar, read_maps(maps), probe=probe, solve=_angles(solve), beam_width_m=beam
-    )
+    result = fit_head(places, lidar, read_maps(maps), probe=probe, solve=_angles(solve), beam_width_m=beam)
     if out is not None:
         _draw(result, out, probe.length_m)
     if write:
@@ -187,7 +191,11 @@ def _map_document(item: "MapPlan") -> dict[str, Any]:
         "elevation_std_deg": seen.elevation_std_deg,
         "range_std_m": seen.range_std_m,
         "windows": [window_record(window) for window in item.windows],
-        "gates": {"first_m": item.gates.first_m, "spacing_m": item.gates.spacing_m, "count": item.gates.count},
+        "gates": {
+            "first_m": item.gates.first_m,
+            "spacing_m": item.gates.spacing_m,
+            "count": item.gates.count,
+        },
         "time_s": item.time_s,
         "others": [
             {"name": other.name, "part": other.part, "range_m": other.range_m, "in_gates": in_gates}
@@ -226,12 +234,24 @@ def _print_plans(plans: "list[MapPlan]") -> None:
                     f"{window.time_s / 60:.1f}",
                 )
             )
-    columns = ("target", "map", "head azimuth °", "head elevation °", "step °", "rays", "range m", "gates", "min")
+    columns = (
+        "target",
+        "map",
+        "head azimuth °",
+        "head elevation °",
+        "step °",
+        "rays",
+        "range m",
+        "gates",
+        "min",
+    )
     print_table("", columns, rows)
     for item in plans:
         for other, in_gates in item.others:
             where = "and in the gates" if in_gates else "outside the gates"
-            say(f"{item.target.name}: {other.part} of {other.name} is in the window at {other.range_m:.0f} m, {where}.")
+            say(
+                f"{item.target.name}: {other.part} of {other.name} is in the window at {other.range_m:.0f} m, {where}."
+            )
         if item.hidden_by:
             say(f"{item.target.name}: {', '.join(item.hidden_by)} may stand before it.")
         for note in item.notes:
@@ -286,7 +306,10 @@ def _fit_document(result: "HeadFit", *, written: bool) -> dict[str, Any]:
             for item, left in zip(result.maps, fitted.residuals, strict=True)
         ],
         "drift": [
-            {key: _number(value) if isinstance(value, float) else value for key, value in drift._asdict().items()}
+            {
+                key: _number(value) if isinstance(value, float) else value
+                for key, value in drift._asdict().items()
+            }
             for drift in result.drifts
         ],
         "site_keys": site_keys(result),
@@ -309,7 +332,15 @@ def _print_fit(result: "HeadFit") -> None:
         for angle in fitted.solved
     ]
     offset = fitted.mounting.range_offset_m
-    rows.append(("range offset m", f"{result.before.range_offset_m:.2f}", f"{offset:.2f}", f"{fitted.range_std_m:.2f}", "–"))
+    rows.append(
+        (
+            "range offset m",
+            f"{result.before.range_offset_m:.2f}",
+            f"{offset:.2f}",
+            f"{fitted.range_std_m:.2f}",
+            "–",
+        )
+    )
     print_table(f"{result.lidar.name}", ("", "before", "found", "std", "change significant"), rows)
     left = [
         (

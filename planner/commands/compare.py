@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from planner.comparing import Comparison
 
 PredictOption = Annotated[
-    bool, typer.Option("--prediction/--no-prediction", help="Put the predicted error beside the measured one.")
+    bool,
+    typer.Option("--prediction/--no-prediction", help="Put the predicted error beside the measured one."),
 ]
 FiguresOption = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]
 
@@ -39,13 +40,18 @@ def compare(
     if out is not None:
         loaded = loaded._replace(campaign=loaded.campaign.model_copy(update={"output": out}))
     found = run(loaded, predict=prediction)
-    files: list[Path] = write_comparison(found, loaded.campaign.output, title=loaded.campaign.name, figures=figures)
+    files: list[Path] = write_comparison(
+        found, loaded.campaign.output, title=loaded.campaign.name, figures=figures
+    )
     if json:
         say_json({"rows": _documents(found), "files": [str(path) for path in files]})
         return
     _print(found)
-    remark("mast = slope · lidar; ± slope: standard error from the scatter; ± lasting: of the prediction, from errors that stay for "
-        "the whole campaign; residual: mast - slope · lidar; direction: on the circle.", quiet=quiet)
+    remark(
+        "mast = slope · lidar; ± slope: standard error from the scatter; ± lasting: of the prediction, from "
+        "errors that stay for the whole campaign; residual: mast - slope · lidar; direction: on the circle.",
+        quiet=quiet,
+    )
     say(str(loaded.campaign.output))
 
 
@@ -67,7 +73,6 @@ def _print(found: "Comparison") -> None:
     )  # fmt: skip
     rows = []
     for row in found.rows:
-        values = {} if row.predicted is None else row.predicted.values
         speed, direction = row.speed, row.direction
         rows.append(
             (
@@ -76,17 +81,17 @@ def _print(found: "Comparison") -> None:
                 str(speed.pairs),
                 _text(speed.slope, ".4f"),
                 _text(speed.slope_standard_error, ".4f"),
-                _text(values.get("slope"), ".4f"),
-                _text(values.get("slope_std"), ".4f"),
+                _text(row.foreseen("slope"), ".4f"),
+                _text(row.foreseen("slope_std"), ".4f"),
                 _text(speed.r_squared, ".4f"),
                 _text(speed.r_squared_uncentred, ".4f"),
                 _text(speed.residual_median_mps, "+.3f"),
                 _text(speed.residual_std_mps, ".3f"),
-                _text(values.get("residual_std_mps"), ".3f"),
+                _text(row.foreseen("residual_std_mps"), ".3f"),
                 _text(direction.slope, ".4f"),
                 _text(direction.intercept_deg, "+.2f"),
                 _text(direction.residual_std_deg, ".2f"),
-                _text(values.get("direction_residual_std_deg"), ".2f"),
+                _text(row.foreseen("direction_residual_std_deg"), ".2f"),
             )
         )
     print_table(f"Means over {found.period_s:g} s against the mast", columns, rows)

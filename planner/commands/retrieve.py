@@ -8,15 +8,19 @@ import typer
 from planner.commands.options import JsonOption, QuietOption, remark, say, say_json
 
 if TYPE_CHECKING:
-    from planner.analysis import Retrieved
+    from planner.analysis_files import Retrieved
 
 CampaignArgument = Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file.")]
 ResultsOption = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results. [default: the campaign's `output`]")
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for the results. [default: the campaign's `output`]"),
 ]
 RestartOption = Annotated[bool, typer.Option("--restart", help="Forget what an unfinished run has done.")]
 InteractiveOption = Annotated[
-    bool, typer.Option("--interactive", help="Show the unfiltered rays and ask for limits until they are approved.")
+    bool,
+    typer.Option(
+        "--interactive", help="Show the unfiltered rays and ask for limits until they are approved."
+    ),
 ]
 
 
@@ -57,7 +61,7 @@ def retrieve(
 
 
 def _print(found: "Retrieved", *, quiet: bool) -> None:
-    from planner.analysis import told
+    from planner.analysis_files import told
     from planner.commands.table import print_table
 
     for scan, steps in found.steps.items():
@@ -66,7 +70,9 @@ def _print(found: "Retrieved", *, quiet: bool) -> None:
     for pair, gaps in found.gaps.items():
         if gaps:
             rows = [(f"{g.gap_s:g}", str(g.pairs), f"{g.share:.1%}", f"{g.median_gap_s:.2f}") for g in gaps]
-            print_table(f"{pair}, rays paired within a time gap", ("gap s", "pairs", "of the rays", "median s"), rows)
+            print_table(
+                f"{pair}, rays paired within a time gap", ("gap s", "pairs", "of the rays", "median s"), rows
+            )
 
 
 def _document(found: "Retrieved") -> dict[str, object]:

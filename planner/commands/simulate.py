@@ -33,7 +33,9 @@ LostOption = Annotated[
 ]
 CellOption = Annotated[
     float | None,
-    typer.Option("--cell-m", metavar="M", help="Side of the turbulence's cells. [default: 1/12 of its length]"),
+    typer.Option(
+        "--cell-m", metavar="M", help="Side of the turbulence's cells. [default: 1/12 of its length]"
+    ),
 ]
 
 
@@ -65,7 +67,9 @@ def simulate(
     from reconstruct.virtual import VirtualSettings
 
     if site == "-":
-        raise InputError("a virtual campaign needs the site file beside it: give its path, not standard input")
+        raise InputError(
+            "a virtual campaign needs the site file beside it: give its path, not standard input"
+        )
     if not 0 <= lost < 1:
         raise InputError(f"--lost {lost:g} came; allowed: a share from 0 to below 1")
     form = chosen("--format", kind, FORMATS)

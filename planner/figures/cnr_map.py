@@ -40,7 +40,9 @@ def cnr_map_figure(mapped: Mapped, probe_m: float) -> bytes:
 def _aside(mapped: Mapped) -> tuple[FloatArray, FloatArray]:
     """(ray,) head angles, the azimuth as a number without a jump at north."""
     middle = mapped.cnr_map.middle_deg[0]
-    return middle + np.asarray(difference_deg(mapped.cnr_map.azimuth_deg, middle)), mapped.cnr_map.elevation_deg
+    return middle + np.asarray(
+        difference_deg(mapped.cnr_map.azimuth_deg, middle)
+    ), mapped.cnr_map.elevation_deg
 
 
 def _mosaic(axes: Any, mapped: Mapped, values: FloatArray, low: float, high: float) -> Any:
@@ -128,6 +130,8 @@ def _gates(figure: "Figure", grid: Any, mapped: Mapped, probe_m: float) -> None:
         mosaic = _mosaic(axes, mapped, mapped.cnr_map.cnr_db[:, gate], float(low), float(high))
         axes.set_xticks([])
         axes.set_yticks([])
-        axes.set_title(f"{mapped.cnr_map.range_m[gate]:.0f} m", fontsize=10, color=CROSSING, fontweight="normal")
+        axes.set_title(
+            f"{mapped.cnr_map.range_m[gate]:.0f} m", fontsize=10, color=CROSSING, fontweight="normal"
+        )
     bar = figure.colorbar(mosaic, ax=figure.axes[-len(GATES_SHOWN) :], pad=0.01)
     bar.set_label("CNR (dB)")

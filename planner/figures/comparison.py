@@ -1,7 +1,8 @@
 """A campaign against its mast: scatter, time series, residual against direction, regression per sector size, wind."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -52,10 +53,19 @@ def scatter(series: Series, *, title: str) -> bytes:
     with canvas(5.2, 5.2) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=(9, 1), height_ratios=(1, 9), wspace=0.02, hspace=0.02)
         axes = figure.add_subplot(grid[1, 0])
-        above, right = figure.add_subplot(grid[0, 0], sharex=axes), figure.add_subplot(grid[1, 1], sharey=axes)
+        above, right = (
+            figure.add_subplot(grid[0, 0], sharex=axes),
+            figure.add_subplot(grid[1, 1], sharey=axes),
+        )
         top = 1.05 * float(max(np.max(series.lidar_mps), np.max(series.mast_mps)))
         axes.plot([0, top], [0, top], color=INK_SOFT, linewidth=0.9, linestyle=(0, (4, 3)), label="equal")
-        axes.plot([0, top], [0, series.slope * top], color=PREDICTED, linewidth=1.4, label=f"{series.slope:.4f} × lidar")
+        axes.plot(
+            [0, top],
+            [0, series.slope * top],
+            color=PREDICTED,
+            linewidth=1.4,
+            label=f"{series.slope:.4f} × lidar",
+        )
         axes.plot(series.lidar_mps, series.mast_mps, "o", color=LIDAR, markersize=3.5, alpha=0.6)
         axes.set(xlim=(0, top), ylim=(0, top), xlabel="lidar [m/s]", ylabel="mast [m/s]", aspect="equal")
         axes.legend(loc="upper left")
@@ -93,11 +103,15 @@ def by_direction(series: Series, *, title: str, bin_deg: float = 10.0) -> bytes:
     angle = np.asarray(difference_deg(series.mast_deg, series.lidar_deg))
     with canvas(8.5, 5.2) as figure:
         names = ("mast − slope × lidar [m/s]", "mast − lidar [°]")
-        for axes, residual, name in zip(figure.subplots(2, 1, sharex=True), (speed, angle), names, strict=True):
+        for axes, residual, name in zip(
+            figure.subplots(2, 1, sharex=True), (speed, angle), names, strict=True
+        ):
             found = residual_by_direction(series.mast_deg, residual, bin_deg=bin_deg)
             there = found.count > 0
             axes.plot(series.mast_deg, residual, ".", color=INK_SOFT, markersize=2.5, alpha=0.5)
-            axes.vlines(found.from_deg[there], found.lower[there], found.upper[there], color=LIDAR, linewidth=3)
+            axes.vlines(
+                found.from_deg[there], found.lower[there], found.upper[there], color=LIDAR, linewidth=3
+            )
             axes.plot(found.from_deg[there], found.median[there], "o", color=PREDICTED, markersize=4)
             axes.axhline(0.0, color=INK, linewidth=0.8)
             axes.set_ylabel(name)
@@ -118,7 +132,14 @@ def per_size(curve: SizeCurve, *, title: str) -> bytes:
     with canvas(10.0, 3.4) as figure:
         for axes, (name, measured, predicted, error) in zip(figure.subplots(1, 3), panels, strict=True):
             axes.errorbar(
-                curve.sector_deg, measured, yerr=error, fmt="o", color=LIDAR, markersize=4, capsize=2, label="measured"
+                curve.sector_deg,
+                measured,
+                yerr=error,
+                fmt="o",
+                color=LIDAR,
+                markersize=4,
+                capsize=2,
+                label="measured",
             )
             if np.any(np.isfinite(predicted)):
                 axes.plot(curve.sector_deg, predicted, "-", color=PREDICTED, linewidth=1.5, label="predicted")
@@ -146,7 +167,7 @@ def _densities(axes: "Axes", series: Series) -> None:
     edges = np.arange(0.0, top + 1.0, 1.0)
     at = np.linspace(1e-3, top, 200)
     for name, speed, colour in (("mast", series.mast_mps, MAST), ("lidar", series.lidar_mps, LIDAR)):
-        axes.hist(speed, bins=edges, density=True, histtype="step", color=colour, linewidth=1.2)
+        axes.hist(speed, bins=edges.tolist(), density=True, histtype="step", color=colour, linewidth=1.2)
         fit = fit_weibull(speed)
         axes.plot(at, _weibull_density(at, fit), color=colour, linewidth=1.0, linestyle=(0, (4, 3)),
                   label=f"{name}: A {fit.scale_mps:.1f}, k {fit.shape:.2f}")  # fmt: skip
@@ -166,7 +187,7 @@ def _rose(figure: "Figure", place: int, name: str, speed: FloatArray, angle: Flo
     width = 360.0 / ROSE_SECTORS
     sector = (np.mod(angle + width / 2, 360.0) // width).astype(int) % ROSE_SECTORS
     bottom = np.zeros(ROSE_SECTORS)
-    for number, (low, high) in enumerate(zip(ROSE_SPEEDS_MPS[:-1], ROSE_SPEEDS_MPS[1:], strict=True)):
+    for number, (low, high) in enumerate(pairwise(ROSE_SPEEDS_MPS)):
         inside = (speed >= low) & (speed < high)
         share = np.bincount(sector[inside], minlength=ROSE_SECTORS) / len(speed)
         label = f"{low:g} to {high:g} m/s" if np.isfinite(high) else f"over {low:g} m/s"
@@ -181,12 +202,18 @@ def _rose(figure: "Figure", place: int, name: str, speed: FloatArray, angle: Flo
         axes.legend(loc="center left", bbox_to_anchor=(1.15, 0.5), fontsize=7.5)
 
 
-def _box(axes: "Axes", values: FloatArray, way: str) -> None:
+def _box(axes: "Axes", values: FloatArray, way: Literal["vertical", "horizontal"]) -> None:
     axes.boxplot(
-        values, orientation=way, widths=0.6, flierprops={"markersize": 2}, medianprops={"color": PREDICTED}  # type: ignore[arg-type]
+        values,
+        orientation=way,
+        widths=0.6,
+        flierprops={"markersize": 2},
+        medianprops={"color": PREDICTED},
     )
     axes.set_axis_off()
 
 
 def _title(figure: "Figure", text: str) -> None:
-    figure.suptitle(shown(text, longest=90), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
+    figure.suptitle(
+        shown(text, longest=90), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False
+    )

@@ -17,6 +17,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from planner.faults import key_of
+from planner.nouns import Noun
 
 if TYPE_CHECKING:
     from geopandas import GeoDataFrame
@@ -443,7 +444,7 @@ def _fields(row: _Row) -> dict[str, Any]:
     """The columns that a noun of this role knows; a number that is none is left for the site to refuse."""
     from planner import standing
 
-    nouns = (
+    nouns: tuple[type[Noun], ...] = (
         standing.Lidar,
         standing.Mast,
         standing.Turbine,

@@ -44,7 +44,9 @@ def load_campaign(path: Path | str) -> Loaded:
     tree = Tree(text)
     if not tree.faults and not isinstance(tree.value, Mapping):
         came = "an empty file" if tree.value is None else spelled(tree.value)
-        raise InputError(f"{path}: {came} came; a campaign file is a mapping with `name:`, `site:` and `inputs:`")
+        raise InputError(
+            f"{path}: {came} came; a campaign file is a mapping with `name:`, `site:` and `inputs:`"
+        )
     raw = tree.value if isinstance(tree.value, dict) else {}
     campaign, faults = _validated(raw)
     site, told = _site(raw, path.parent)
@@ -62,7 +64,9 @@ def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; `lidarplan simulate SITE` writes one to start from") from None
+        raise InputError(
+            f"{path}: there is no such file; `lidarplan simulate SITE` writes one to start from"
+        ) from None
     except IsADirectoryError:
         raise InputError(f"{path}: this is a folder; did you mean {path / 'campaign.yaml'}?") from None
     except OSError as error:
@@ -102,10 +106,16 @@ def _missing(raw: Mapping[str, object], folder: Path) -> Iterator[Fault]:
     """Files that the campaign names and that are not there."""
     for index, item in entries(raw, "inputs"):
         name = item.get("path")
-        if isinstance(name, str) and not (_matches(folder, name) if _is_pattern(name) else (folder / name).exists()):
+        if isinstance(name, str) and not (
+            _matches(folder, name) if _is_pattern(name) else (folder / name).exists()
+        ):
             yield Fault(("inputs", index, "path"), name, f"files that exist (looked for {folder / name})")
     mast = raw.get("mast")
-    if isinstance(mast, Mapping) and isinstance(name := mast.get("path"), str) and not (folder / name).is_file():
+    if (
+        isinstance(mast, Mapping)
+        and isinstance(name := mast.get("path"), str)
+        and not (folder / name).is_file()
+    ):
         yield Fault(("mast", "path"), name, f"a file that exists (looked for {folder / name})")
 
 
@@ -126,7 +136,9 @@ def _unknown_names(raw: Mapping[str, object], site: Site) -> Iterator[Fault]:
     for index, item in entries(raw, "inputs"):
         name = item.get("scan")
         if isinstance(name, str) and name not in scans:
-            yield Fault(("inputs", index, "scan"), name, f"a scan of the site: {', '.join(scans) or 'it has none'}")
+            yield Fault(
+                ("inputs", index, "scan"), name, f"a scan of the site: {', '.join(scans) or 'it has none'}"
+            )
         if name in read:
             yield Fault(("inputs", index, "scan"), name, "each scan once; name several files by one pattern")
         read.append(name)
@@ -154,7 +166,11 @@ def _rooted(campaign: Campaign, folder: Path) -> Campaign:
         for item in campaign.inputs
     )
     mast = campaign.mast
-    update: dict[str, object] = {"inputs": inputs, "site": folder / campaign.site, "output": folder / campaign.output}
+    update: dict[str, object] = {
+        "inputs": inputs,
+        "site": folder / campaign.site,
+        "output": folder / campaign.output,
+    }
     if mast is not None:
         update["mast"] = mast.model_copy(update={"path": str(folder / mast.path)})
     return campaign.model_copy(update=update)

@@ -86,6 +86,8 @@ def write_lidar(path: Path, lidar: str, values: Mapping[str, float]) -> Site:
     if after.model_copy(update=others) != before.model_copy(
         update={"lidars": tuple(item for item in before.lidars if item.name != lidar)}
     ):
-        raise InputError(f"{path}: more than the offsets would change; the file stays as it is. Edit it by hand")
+        raise InputError(
+            f"{path}: more than the offsets would change; the file stays as it is. Edit it by hand"
+        )
     write_text(path, text)
     return after

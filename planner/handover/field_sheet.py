@@ -211,12 +211,12 @@ def position_rows(places: Places, lidar: Lidar) -> list[tuple[str, str]]:
     longitude, latitude, _ = (float(value) for value in places.frame.geographic(lidar.position))
     above = "sea level" if site.height_datum == "above_sea_level" else "the ellipsoid"
     return [
-        ("easting, northing", f"{easting:.3f} m, {northing:.3f} m  ({site.crs})"),
+        ("east, north", f"{easting:.3f} m, {northing:.3f} m ({site.crs})"),
         (
-            "height of the head",
-            f"{height:.3f} m above {above}; {fixed(height - site.ground_m, 2)} m above the ground level {site.ground_m:g} m",
+            "height",
+            f"{height:.3f} m above {above}, {_above(height - site.ground_m)} the ground ({site.ground_m:g} m)",
         ),
-        ("latitude, longitude", f"{degrees_minutes(latitude, 'NS')}, {degrees_minutes(longitude, 'EW')}"),
+        ("lat., lon.", f"{degrees_minutes(latitude, 'NS')}, {degrees_minutes(longitude, 'EW')}"),
         ("", f"{latitude:.7f}, {longitude:.7f}"),
         ("to be within", f"{lidar.uncertainty.position_m:g} m (k = 1)"),
     ]
@@ -230,7 +230,7 @@ def north_rows(places: Places, lidar: Lidar, declination_deg: float | None) -> l
     compass = magnetic_deg(zero_deg, declination_deg)
     rows = [
         (
-            "zero of the head",
+            "head's zero",
             f"{zero_deg:.3f}° from true, {wrap_360_deg(zero_deg - convergence_deg):.3f}° from grid north",
         ),
         ("", f"{compass:.1f}° by compass" if compass is not None else "by compass: give --declination"),
@@ -252,7 +252,7 @@ def level_rows(site: Site, lidar: Lidar, ranges_m: Sequence[float]) -> list[tupl
     limit_m = site.tolerance.position_m
     rows = [
         (
-            "planned within",
+            "level within",
             f"{lidar.uncertainty.levelling_deg:g}° = {_slope(lidar.uncertainty.levelling_deg)} (k = 1)",
         )
     ]
@@ -339,11 +339,10 @@ def _hard_targets(
     ]
     if not declared:
         things = [
-            (mast.name, "top of mast", (*mast.position[:2], mast.position[2] + mast.height_m))
-            for mast in site.masts
+            (mast.name, "top", (*mast.position[:2], mast.position[2] + mast.height_m)) for mast in site.masts
         ]
         things += [
-            (item.name, "tower at hub", (*item.position[:2], item.position[2] + item.hub_height_m))
+            (item.name, "hub", (*item.position[:2], item.position[2] + item.hub_height_m))
             for item in site.turbines
         ]
     return [
@@ -379,6 +378,10 @@ def _from_to(first: float, last: float, ends: Any) -> str:
     if abs(last - first) < 5e-4:  # a raster or list that comes back
         first, last = float(min(ends)), float(max(ends))
     return f"{fixed(first, 3)} to {fixed(last, 3)}"
+
+
+def _above(height_m: float) -> str:
+    return f"{abs(height_m):.2f} m {'above' if height_m >= 0 else 'below'}"
 
 
 def _side(angle_deg: float, digits: int) -> str:

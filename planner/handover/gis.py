@@ -94,7 +94,8 @@ def _tidied(document: bytes) -> bytes:
     for parent in list(root.iter()):
         for child in [item for item in parent if item.get("name") in DRAWN]:
             parent.remove(child)
-    return ElementTree.tostring(tree, encoding="utf-8", xml_declaration=True)
+    text: bytes = ElementTree.tostring(tree, encoding="utf-8", xml_declaration=True)
+    return text
 
 
 def write_geojson(layers: "dict[str, GeoDataFrame]", site: Site, folder: Path) -> None:

@@ -57,7 +57,7 @@ def layers(plan: Plan) -> "dict[str, GeoDataFrame]":
 
 def site_layers(site: Site) -> "dict[str, GeoDataFrame]":
     """Make the layers of what stands on the site or is to be measured there."""
-    made = {
+    made: dict[str, Sequence[tuple[Sequence[float], Record]]] = {
         "lidars": [_lidar(site, number) for number in range(len(site.lidars))],
         "masts": [(item.position, _plain("mast", item)) for item in site.masts],
         "turbines": [(item.position, _plain("turbine", item)) for item in site.turbines],

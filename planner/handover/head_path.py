@@ -88,7 +88,7 @@ def sweeps(path: HeadPath) -> list[Sweep]:
     starts = np.flatnonzero(np.concatenate([[True], gap | rest[1:] | back]))
     stops = np.append(starts[1:], len(turn))
     found: list[Sweep] = []
-    for start, stop in zip(starts, stops, strict=True):
+    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
         pieces = (
             [(start, stop)]
             if _straight(path, start, stop)

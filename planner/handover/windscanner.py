@@ -259,7 +259,8 @@ def _pulse(layout: ScanLayout) -> tuple[float, int]:
 
 
 def _pulse_rate(layout: ScanLayout) -> float:
-    """Pulses per second."""
+    """Pulses per second, of a pulse that is one of the modes."""
+    _pulse(layout)
     if layout.pulse is None:
         raise InputError(
             f"scan '{layout.name}': {layout.lidar.device.name} has no pulse of {layout.spec.pulse_ns} ns; "

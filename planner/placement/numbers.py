@@ -46,7 +46,7 @@ class Numbers(NamedTuple):
         return float(each.max() if aggregate == "worst" else np.sqrt(np.mean(each**2)))
 
 
-def numbers_of(task: Task, looks: Sequence[Look]) -> Numbers:
+def numbers_of(task: Task, looks: Sequence[Look], *, sharing: int = 1) -> Numbers:
     """Work out the numbers of lidars that stand and of those that are placed.
 
     Parameters
@@ -55,6 +55,8 @@ def numbers_of(task: Task, looks: Sequence[Look]) -> Numbers:
         What they are for.
     looks
         One place each: the lidars that stand, then those that are placed.
+    sharing
+        Among how many targets each lidar splits its time: noise is √n times as large in the time of one retrieval.
 
     Returns
     -------
@@ -63,7 +65,7 @@ def numbers_of(task: Task, looks: Sequence[Look]) -> Numbers:
     """
     lidars = [*task.fixed, *[task.pattern] * (len(looks) - len(task.fixed))]
     noise = [
-        echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[:, 0]
+        np.sqrt(sharing) * echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[:, 0]
         for lidar, each in zip(lidars, looks, strict=True)
     ]
     heads = np.concatenate([each.local_m for each in looks])

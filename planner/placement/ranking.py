@@ -23,7 +23,8 @@ from planner.placement.maps import (
 )
 from planner.placement.numbers import Numbers, numbers_of, turbulent_numbers
 from planner.placement.refine import WORTH, Improve, SoftCost, binding, refined
-from planner.placement.task import Task
+from planner.placement.task import Task, default_limits
+from planner.site import Lidar
 from reconstruct.beam_table import BeamTable
 
 PHYSICAL = ("range-min", "range-max", "terrain")
@@ -108,17 +109,25 @@ def fixed_tables(task: Task) -> list[BeamTable]:
     """
     out = []
     for lidar in task.fixed:
-        seen = of_lidar(task, lidar)
+        seen = _standing(task, lidar)
         physical = replace(seen, slack={name: seen.slack[name] for name in PHYSICAL})
         out.append(table_of(task, physical, lidar=lidar))
     return out
+
+
+def _standing(task: Task, lidar: Lidar) -> Look:
+    """The criteria of a lidar where it stands, by its own instrument's range and not by what is asked of the others."""
+    seen = of_lidar(task, lidar)
+    own = default_limits(lidar, task.scan_of(lidar))
+    ranges = {"range-min": seen.range_m - own.least_range_m, "range-max": own.most_range_m - seen.range_m}
+    return replace(seen, slack={**seen.slack, **ranges})
 
 
 def standing_remarks(task: Task) -> tuple[str, ...]:
     """What the lidars that stand break, in words."""
     remarks = []
     for lidar in task.fixed:
-        for name, slack in of_lidar(task, lidar).slack.items():
+        for name, slack in _standing(task, lidar).slack.items():
             out = [target for target, values in zip(task.targets, slack, strict=True) if not values[0] >= 0.0]
             if out:
                 remarks.append(f"{lidar.name}, which stands, breaks at {', '.join(out)}: {CRITERIA[name][1]}")

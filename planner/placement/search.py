@@ -13,7 +13,7 @@ from reconstruct.beam_table import BeamTable, pair_variance, set_variance, wides
 TILE = 256  # candidates whose pairs are worked on at once: half a megabyte a matrix
 
 # Measured: one pair at one target, on one core.
-PAIR_TARGET_S = 5e-9
+PAIR_TARGET_S = 3.5e-9
 
 # Rounds of exchange of a set; each one is exhaustive in one member.
 EXCHANGES = 20

@@ -130,22 +130,6 @@ def days_needed(one_day: Yield, *, least_per_bin: float, wanted: ArrayLike | Non
     return least_per_bin / least if least > 0 else float("inf")
 
 
-def time_share(targets: int) -> float:
-    """What sharing one lidar among several heights or targets multiplies the error of each by: √n, of white noise.
-
-    In the time of one retrieval each target gets 1/n of the rays, and noise falls with the root of their number; what
-    turbulence adds, and pointing does not, is for the turbulent tier with the period n times as long.
-
-    Examples
-    --------
-    >>> time_share(4)
-    2.0
-    """
-    if targets < 1:
-        raise InputError(f"{targets} targets came; one lidar measures at least one")
-    return float(np.sqrt(targets))
-
-
 def _speed_shares(site: Site, cell: SectorSet, edges: FloatArray) -> FloatArray:
     """(speed,) share of all wind that comes from some directions at the speeds of each bin."""
     wind = site.assumed_wind

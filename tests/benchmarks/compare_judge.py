@@ -20,7 +20,7 @@ from geometry.gates import Probe  # noqa: E402
 from reconstruct.monte_carlo import Scene, Settings, simulate_scenes  # noqa: E402
 from reconstruct.rays import Rays  # noqa: E402
 from reconstruct.spectra import Turbulence  # noqa: E402
-from reconstruct.ten_minute import predict_ten_minute  # noqa: E402
+from reconstruct.ten_minute import AVERAGING_S, predict_ten_minute  # noqa: E402
 from reconstruct.turbulent import predict_turbulent  # noqa: E402
 from reconstruct.uncertainty import ErrorSources  # noqa: E402
 from reconstruct.verdict import judge  # noqa: E402
@@ -161,19 +161,28 @@ class Row(NamedTuple):
         return abs(self.errors) <= AGREED_ERRORS or abs(self.share) <= AGREED_SHARE
 
 
-def predicted(rays: Rays, wind: WindState, air: Air) -> list[float]:
+def predicted(rays: Rays, wind: WindState, air: Air, averaging_s: float) -> list[float]:
     """Numbers of the turbulent tier, in the order of NAMES."""
     scan = predict_turbulent(
         rays, wind, air.turbulence, ErrorSources(radial_speed_mps=air.noise_mps), reference="vector"
     )
-    mean = predict_ten_minute(rays, wind, air.turbulence, random_m2s2=air.noise_mps**2)
+    mean = predict_ten_minute(
+        rays, wind, air.turbulence, random_m2s2=air.noise_mps**2, averaging_s=averaging_s
+    )
     ten = (mean.speed_bias_mps, mean.speed_std_mps, mean.direction_std_deg)
     across, along = np.diag(scan.covariance_m2s2)
     one = (across, along, scan.speed_std_mps, scan.speed_bias_mps, scan.direction_std_deg)
     return [float(value) for value in (*one, *ten)]
 
 
-def compare(air: Air, *, fields: int, seed: int, cells_per_length: float | None = None) -> list[Row]:
+def compare(
+    air: Air,
+    *,
+    fields: int,
+    seed: int,
+    cells_per_length: float | None = None,
+    averaging_s: float = AVERAGING_S,
+) -> list[Row]:
     """Rows of all scenes of one air: one flight of ten minutes through each field."""
     winds = {name: WindState(air.speed_mps, from_deg) for name, (_, from_deg) in air.scenes.items()}
     found = simulate_scenes(
@@ -184,6 +193,7 @@ def compare(air: Air, *, fields: int, seed: int, cells_per_length: float | None 
         settings=Settings(
             realisations=fields,
             flights_per_field=1,
+            averaging_s=averaging_s,
             spacing_m=min(air.turbulence.length_m / (cells_per_length or air.cells_per_length), 40.0),
         ),
     )
@@ -196,7 +206,7 @@ def compare(air: Air, *, fields: int, seed: int, cells_per_length: float | None 
         label = (
             f"{name}; TI {air.turbulence.intensity:g}, L {air.turbulence.length_m:g} m, {air.speed_mps:g} m/s"
         )
-        ours = predicted(rays, winds[name], air)
+        ours = predicted(rays, winds[name], air, averaging_s)
         for what, one, other in zip(NAMES, ours, (*theirs, *means), strict=True):
             out.append(Row(label, what, one, other.value, other.standard_error))
     return out

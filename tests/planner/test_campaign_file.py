@@ -93,8 +93,14 @@ def test_each_fault_says_where_what_came_and_what_is_allowed(
 
 
 def test_all_faults_are_told_in_one_pass(folder: Path) -> None:
-    text = GOOD.replace("scan: s,", "scan: t,").replace("mast.csv", "gone.csv").replace("[-25, null]", "[a, b]")
-    assert {line.split(": ")[1] for line in faults(folder, text)} >= {"inputs[0].scan", "mast.path", "filters.cnr_db[0]"}
+    text = (
+        GOOD.replace("scan: s,", "scan: t,").replace("mast.csv", "gone.csv").replace("[-25, null]", "[a, b]")
+    )
+    assert {line.split(": ")[1] for line in faults(folder, text)} >= {
+        "inputs[0].scan",
+        "mast.path",
+        "filters.cnr_db[0]",
+    }
 
 
 def test_a_fault_of_the_site_is_told_with_the_campaign(folder: Path) -> None:

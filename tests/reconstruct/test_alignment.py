@@ -76,5 +76,8 @@ def test_missing_samples_are_left_out_and_nothing_gives_nothing() -> None:
 
 def test_two_sonics_share_the_lidars_heading_and_keep_their_difference() -> None:
     """The WindEye test trimmed each sonic on its own beam: across north too."""
-    trims = tuple(orientation_trim([0.0, 90.0], 0.0, [0.0, 8.0], 8 * np.cos(a), 8 * np.sin(a)) for a in np.radians([3.0, -1.0]))
+    trims = tuple(
+        orientation_trim([0.0, 90.0], 0.0, [0.0, 8.0], 8 * np.cos(a), 8 * np.sin(a))
+        for a in np.radians([3.0, -1.0])
+    )
     assert two_sonics_trim(trims) == pytest.approx((1.0, 4.0), abs=1e-6)  # type: ignore[arg-type]

@@ -79,7 +79,10 @@ def test_availability_is_the_share_of_what_a_full_period_has() -> None:
     assert expected_count(600.0, 7000.0) == 1
 
 
-@given(st.lists(st.tuples(st.floats(0, 5000), st.floats(-20, 20), st.floats(-20, 20)), min_size=2, max_size=40), st.integers(1, 39))
+@given(
+    st.lists(st.tuples(st.floats(0, 5000), st.floats(-20, 20), st.floats(-20, 20)), min_size=2, max_size=40),
+    st.integers(1, 39),
+)
 @settings(max_examples=50, deadline=None, derandomize=True)
 def test_sums_of_parts_are_the_sums_of_the_whole(samples: list[tuple[float, float, float]], cut: int) -> None:
     seconds, u, v = (np.array(part) for part in zip(*samples, strict=True))

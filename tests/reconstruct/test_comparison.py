@@ -55,7 +55,9 @@ def test_the_standard_error_covers_the_truth_as_often_as_it_should() -> None:
     off = []
     for _ in range(200):
         lidar = rng.uniform(4.0, 16.0, 150)
-        fit = fit_speed(lidar * (1 + 0.05 * rng.standard_normal(150)), lidar)  # scatter that grows with the wind
+        fit = fit_speed(
+            lidar * (1 + 0.05 * rng.standard_normal(150)), lidar
+        )  # scatter that grows with the wind
         off.append((fit.slope - 1.0) / fit.slope_standard_error)
     assert np.std(off) == pytest.approx(1.0, abs=0.15)
 
@@ -107,7 +109,9 @@ def test_away_from_north_the_circular_fit_is_the_plain_one_and_numpys() -> None:
 
 def test_the_plain_way_is_wrecked_by_one_pair_across_north() -> None:
     lidar, mast = np.array([200.0, 230.0, 260.0, 359.0]), np.array([200.0, 230.0, 260.0, 1.0])
-    assert fit_direction_plainly(mast, lidar).std_deg < 2.0  # the circle is never left out of the error itself
+    assert (
+        fit_direction_plainly(mast, lidar).std_deg < 2.0
+    )  # the circle is never left out of the error itself
     assert fit_direction_plainly(mast, lidar).slope < 0.0
     assert fit_direction(mast, lidar).slope == pytest.approx(1.0, abs=0.02)
 
@@ -135,7 +139,9 @@ def test_a_bin_without_wind_is_unknown_and_quartiles_are_numpys() -> None:
     rng = np.random.default_rng(7)
     values = rng.normal(size=101)
     found = residual_by_direction(np.full(101, 45.0), values, bin_deg=90.0)
-    assert [found.lower[0], found.median[0], found.upper[0]] == pytest.approx(np.percentile(values, [25, 50, 75]).tolist())
+    assert [found.lower[0], found.median[0], found.upper[0]] == pytest.approx(
+        np.percentile(values, [25, 50, 75]).tolist()
+    )
     assert np.isnan(found.median[1:]).all()
 
 

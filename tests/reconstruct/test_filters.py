@@ -53,7 +53,9 @@ def test_filters_do_not_write_to_what_came() -> None:
     assert speed.tolist() == [[5.0, 50.0]]
 
 
-@given(st.lists(st.lists(st.booleans(), min_size=6, max_size=6), min_size=1, max_size=8), st.floats(0.01, 1.0))
+@given(
+    st.lists(st.lists(st.booleans(), min_size=6, max_size=6), min_size=1, max_size=8), st.floats(0.01, 1.0)
+)
 @settings(max_examples=50, deadline=None, derandomize=True)
 def test_a_partial_scan_is_kept_whole_or_dropped_whole(there: list[list[bool]], share: float) -> None:
     speed = np.where(np.array(there), 5.0, np.nan)
@@ -101,7 +103,7 @@ def test_goodness_is_that_of_the_textbook() -> None:
     speed[[2, 17]] = np.nan
     found = goodness(sector_wind(AZIMUTH, 5.96, speed), speed, noise_mps=0.3)
     known = np.isfinite(speed)
-    solution, squares, _, _ = np.linalg.lstsq(matrix[known], speed[known], rcond=None)
+    _, squares, _, _ = np.linalg.lstsq(matrix[known], speed[known], rcond=None)
     total = np.sum((speed[known] - speed[known].mean()) ** 2)
     assert found.residual_std_mps == pytest.approx(np.sqrt(squares[0] / 26))
     assert found.r_squared == pytest.approx(1 - squares[0] / total)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reconstruct.field import MARGIN_LENGTHS
 from reconstruct.spectra import Turbulence
 from reconstruct.ten_minute import predict_ten_minute
 from reconstruct.wind import WindState
@@ -15,6 +16,7 @@ from reconstruct.wind import WindState
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 FIELDS = 24
 CELLS_PER_LENGTH = 5.0
+AVERAGING_S = 300.0  # instead of ten minutes: half the box
 
 
 def benchmark(name):
@@ -33,13 +35,19 @@ def rows():
     return [
         row
         for air in airs
-        for row in module.compare(air, fields=FIELDS, seed=1, cells_per_length=CELLS_PER_LENGTH)
+        for row in module.compare(
+            air, fields=FIELDS, seed=1, cells_per_length=CELLS_PER_LENGTH, averaging_s=AVERAGING_S
+        )
     ]
 
 
 def test_tier_is_within_three_standard_errors_or_two_per_cent_of_the_judge_on_twelve_scenes(rows):
+    """Of 96 numbers 0.6 are expected outside by chance alone: with 24 fields the distance in standard errors is
+    a Student t of 23 degrees of freedom. Three or more outside (2 %), or one beyond 5, would be no chance."""
     assert len({row.scene for row in rows}) == 12
-    assert [row for row in rows if not row.agrees] == []
+    outside = [row for row in rows if not row.agrees]
+    assert len(outside) < 3, outside
+    assert all(abs(row.errors) < 5 for row in outside), outside
 
 
 def test_standard_errors_of_the_judge_are_those_of_its_distance_to_the_tier(rows):
@@ -59,14 +67,16 @@ def test_comparison_would_notice_turbulence_that_is_a_quarter_stronger(rows):
     assert np.mean(noticed) > 0.8
 
 
-def test_box_of_the_judge_keeps_the_ten_minute_scatter_of_a_wide_scan():
-    """Exact sum over the waves of a box seven lengths larger than what is met, against one of fourteen and
-    against the closed form: the longest lateral waves are missing in lidar and target alike."""
+def test_box_of_the_judge_keeps_what_a_wide_scan_and_ten_minutes_average():
+    """Exact sums over the waves of the box: copies abreast of the scan take little from the wind along its axis
+    (seven lengths to each side took 5 %), or from the ten-minute scatter against the target."""
     box, air, wind = benchmark("box_waves"), Turbulence(0.09, 170.0), WindState(8.0, 192.0)
     rays = box.hovsore()
-    seven, fourteen = (box.scatter(rays, wind, air, margin) for margin in (7, 14))
-    assert seven.difference == pytest.approx(fourteen.difference, rel=0.005)
-    assert seven.difference == pytest.approx(
-        float(predict_ten_minute(rays, wind, air).direction_std_deg), rel=0.01
+    used, seven, large = (
+        box.along_axis(rays, wind, air, margin)
+        for margin in (MARGIN_LENGTHS, np.full(3, 7.0), np.full(3, 14.0))
     )
-    assert 0.02 < 1 - seven.target / fourteen.target < 0.06  # the mean of the target alone does lose some
+    assert used == pytest.approx(large, rel=0.01)
+    assert seven < 0.96 * large
+    ours = box.scatter(rays, wind, air, MARGIN_LENGTHS).difference
+    assert ours == pytest.approx(float(predict_ten_minute(rays, wind, air).direction_std_deg), rel=0.01)

@@ -1,0 +1,291 @@
+"""CNR maps from plan to site file: the window holds the target, and planted offsets come back."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.angles import difference_deg
+from geometry.errors import InputError
+from geometry.gates import Probe
+from geometry.head import Mounting
+from planner.cnr_fit import Mapped, drifts, fit_head, site_keys
+from planner.cnr_map import choose_targets, plan_map
+from planner.figures.cnr_map import cnr_map_figure
+from planner.files.yaml_edit import write_lidar
+from planner.files.yaml_site import load_site, parse_site
+from planner.hard_targets import sought
+from planner.places import Places
+from reconstruct.cnr_map import CnrMap
+from reconstruct.cnr_simulation import simulate_cnr_map
+from reconstruct.hard_target import find_target
+from reconstruct.record_tables import to_wide
+from reconstruct.records import Records
+
+ROOT = Path(__file__).resolve().parents[2]
+PROBE = Probe(pulse_ns=200, window_ns=256)
+GATES = 81
+SITE = """\
+name: three masts  # for maps
+crs: EPSG:32632
+ground_height_m: 4.8
+lidars:
+  # the one in the middle
+  - name: L
+    position: [447893.983, 6256558.133, 5.078]
+    instrument: windscanner-200s
+    azimuth_offset_deg: 12.3   # first guess
+    elevation_offset_deg: 0.6
+    uncertainty: {position_m: 0.02, heading_deg: 0.05, levelling_deg: 0.03, azimuth_deg: 0.02, elevation_deg: 0.02}
+  - {name: other, position: [448893.983, 6256558.133, 5.078], instrument: windscanner-200s, azimuth_offset_deg: 1.5}
+masts:
+  - {name: north, position: [447950, 6257500, 5], height_m: 90, width_m: 1}
+  - {name: east, position: [448700, 6256200, 5], height_m: 80, width_m: 1}
+  - {name: south, position: [447647.39, 6255635.76, 4.836], height_m: 100, width_m: 1}
+  - {name: west, position: [447000, 6256700, 5], height_m: 70, width_m: 1}
+hard_targets:
+  - {name: tip N, on: north, shape: tip, size_m: 1, uncertainty_m: 0.02}
+  - {name: tip E, on: east, shape: tip, size_m: 1, uncertainty_m: 0.02}
+  - {name: tip S, on: south, shape: tip, size_m: 1, uncertainty_m: 0.02}
+  - {name: tip W, on: west, shape: tip, size_m: 1, uncertainty_m: 0.02}
+targets:
+  - {name: cup, mast: south, height_m: 103}
+"""
+TIPS = ("tip N", "tip E", "tip S", "tip W")
+PLANTED = {"azimuth_offset_deg": 12.35, "pitch_deg": 0.03, "roll_deg": -0.03}
+
+
+@pytest.fixture
+def site_file(tmp_path: Path) -> Path:
+    path = tmp_path / "site.yaml"
+    path.write_text(SITE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def places() -> Places:
+    return Places(parse_site(SITE))
+
+
+def planned_map(places: Places, target: str, true: Mounting, rng: np.random.Generator) -> CnrMap:
+    """What the planned scan measures with a head that stands like this; gates in the middle of the planned ones."""
+    lidar = places.site.lidar("L")
+    plan = plan_map(places, "L", target)
+    declared, position = sought(places.site, target)
+    middle = round(plan.expected.range_head_m)
+    place = places.frame.enu_m(lidar.position, np.add(position, rng.normal(0, declared.uncertainty_m, 3)))
+    return simulate_cnr_map(
+        *plan.windows[-1].rays,
+        np.arange(middle - GATES // 2, middle + GATES // 2 + 1.0),
+        target_m=place,
+        shape=declared.shape,
+        size_m=declared.size_m,
+        probe=PROBE,
+        rng=rng,
+        mounting=true,
+    )
+
+
+def planted(places: Places) -> Mounting:
+    return replace(places.mounting(places.site.lidar("L")), **PLANTED)
+
+
+def maps_of(places: Places, seed: int, names=TIPS) -> list[tuple[str, CnrMap]]:
+    rng = np.random.default_rng(seed)
+    return [(name, planned_map(places, name, planted(places), rng)) for name in names]
+
+
+def test_planted_offsets_come_back_within_a_hundredth_of_a_degree_and_inside_their_uncertainty(
+    places: Places,
+) -> None:
+    """0.05° of heading, 0.03° of pitch and roll, 1 m gates; 5 seeded runs of what 200 were tried of."""
+    inside = []
+    for seed in range(5):
+        fit = fit_head(places, "L", maps_of(places, seed), probe=PROBE).fit
+        for angle in fit.solved:
+            error = getattr(fit.mounting, angle) - getattr(planted(places), angle)
+            assert abs(error) < 0.01
+            inside.append(abs(error) < 2 * fit.std_deg(angle))
+    assert np.mean(inside) >= 0.8
+
+
+def test_the_window_is_three_sigma_and_centred_on_where_the_head_must_point(places: Places) -> None:
+    plan = plan_map(places, "L", "tip S")
+    azimuth, elevation = plan.windows[-1].rays
+    head = places.mounting(places.site.lidar("L")).to_head(
+        plan.expected.true.azimuth_deg, plan.expected.true.elevation_deg
+    )
+    assert abs(float(np.mean([azimuth.min(), azimuth.max()])) - float(head[0])) < 1e-9
+    assert abs(float(np.mean([elevation.min(), elevation.max()])) - float(head[1])) < 1e-9
+    assert azimuth.max() - azimuth.min() > 6 * 0.05
+    assert np.hypot(0.05, 0.02) < plan.expected.azimuth_std_deg < 0.06
+
+
+def test_every_step_of_a_serpentine_is_one_step_long_and_its_time_adds_up(places: Places) -> None:
+    """Rays of 100 ms and moves of 2 sqrt(step/acceleration), by hand."""
+    for order in ("rows", "columns"):
+        window = plan_map(places, "L", "tip S", order=order).windows[-1]
+        azimuth, elevation = window.rays
+        moves = np.maximum(np.abs(np.diff(azimuth)), np.abs(np.diff(elevation)))
+        assert moves.max() < 0.02
+        assert window.time_s == pytest.approx(0.1 * azimuth.size + (2 * np.sqrt(moves / 100)).sum(), rel=1e-6)
+
+
+def test_an_unknown_heading_is_found_by_one_row_around_the_circle(places: Places) -> None:
+    coarse, fine = plan_map(places, "L", "tip S", heading_std_deg=180.0).windows
+    assert coarse.elevation_deg.size == 1
+    assert np.ptp(coarse.azimuth_deg) >= 359.9
+    assert coarse.elevation_deg[0] < fine.elevation_deg.mean()
+    assert np.ptp(fine.azimuth_deg) < 1.0
+
+
+def test_targets_around_are_chosen_and_targets_in_one_direction_are_warned_of(places: Places) -> None:
+    choice = choose_targets(places, "L")
+    assert choice is not None
+    assert len(choice.names) == 3
+    assert choice.undetermined == ()
+    few = Places(
+        places.site.model_copy(
+            update={"hard_targets": places.site.hard_targets[:1], "masts": places.site.masts[:1]}
+        )
+    )
+    warned = choose_targets(few, "L")
+    assert warned is not None
+    assert {"pitch_deg", "roll_deg"} <= set(warned.undetermined)
+
+
+def test_a_rotor_before_the_mast_at_hovsore_is_named() -> None:
+    plan = plan_map(Places(load_site(ROOT / "examples" / "hovsore" / "site.yaml")), "WS_S", "mast")
+    assert [(item.name, item.part, inside) for item, inside in plan.others] == [("stand 5", "rotor", False)]
+    assert plan.hidden_by == ("stand 5",)
+
+
+def test_one_map_gives_no_offsets_and_says_why(places: Places) -> None:
+    with pytest.raises(InputError, match=r"tip N.* do not determine"):
+        fit_head(places, "L", maps_of(places, 1, TIPS[:1]), probe=PROBE)
+
+
+def test_every_map_without_a_target_is_named(places: Places) -> None:
+    good = maps_of(places, 1)
+    dark = [
+        (name, CnrMap(m.azimuth_deg, m.elevation_deg, m.range_m, np.minimum(m.cnr_db, -20.0)))
+        for name, m in good[:2]
+    ]
+    with pytest.raises(InputError, match=r"map 1 \(tip N\).*\n.*map 2 \(tip E\)"):
+        fit_head(places, "L", [*dark, *good[2:]], probe=PROBE)
+
+
+def test_a_head_that_moved_between_two_tests_has_drifted(places: Places) -> None:
+    rng = np.random.default_rng(4)
+    first = maps_of(places, 3)
+    turned = replace(planted(places), azimuth_offset_deg=12.33)
+    again = [
+        ("tip S", planned_map(places, "tip S", turned, rng)),
+        ("tip W", planned_map(places, "tip W", planted(places), rng)),
+    ]
+    repeated = fit_head(places, "L", [*first, again[1]], probe=PROBE).drifts
+    assert [(item.target, item.maps) for item in repeated] == [("tip W", 2)]
+    assert abs(repeated[0].azimuth_deg) < 0.01
+    pair = [
+        Mapped(
+            name, sought(places.site, name)[0], m, find_target(m, shape="tip", size_m=1.0, probe=PROBE), None
+        )
+        for name, m in (first[2], again[0])
+    ]
+    (moved,) = drifts(pair)
+    assert moved.is_significant
+    assert moved.azimuth_deg == pytest.approx(0.02, abs=0.006)
+
+
+def test_offsets_go_into_the_site_file_and_leave_the_rest_as_it_is(site_file: Path) -> None:
+    before = SITE.splitlines()
+    after = write_lidar(site_file, "L", {"azimuth_offset_deg": 12.3512, "mounting.pitch_deg": 0.0301})
+    text = site_file.read_text(encoding="utf-8").splitlines()
+    changed = [line for line in text if line not in before]
+    assert [line.split()[0] for line in changed] == ["azimuth_offset_deg:", "mounting:"]
+    assert "# first guess" in changed[0]
+    assert [line for line in before if line not in text] == ["    azimuth_offset_deg: 12.3   # first guess"]
+    assert after.lidar("L").mounting.pitch_deg == 0.0301
+
+
+def test_what_would_make_no_valid_site_leaves_the_file_alone(site_file: Path) -> None:
+    with pytest.raises(InputError):
+        write_lidar(site_file, "L", {"azimuth_ofset_deg": 1.0})
+    assert site_file.read_text(encoding="utf-8") == SITE
+    assert [path.name for path in site_file.parent.iterdir()] == ["site.yaml"]
+
+
+def test_a_zero_at_grid_north_stays_out_of_the_heading_that_is_written() -> None:
+    grid = Places(
+        parse_site(
+            SITE.replace(
+                "instrument: windscanner-200s\n    azimuth",
+                "instrument: windscanner-200s\n    north: grid\n    azimuth",
+            )
+        )
+    )
+    result = fit_head(
+        grid,
+        "L",
+        maps_of(grid, 2),
+        probe=PROBE,
+        solve=("heading_deg", "elevation_offset_deg", "pitch_deg", "roll_deg"),
+    )
+    assert site_keys(result)["mounting.heading_deg"] == pytest.approx(0.05, abs=0.01)
+
+
+def test_the_figure_of_a_map_is_a_picture(places: Places) -> None:
+    result = fit_head(places, "L", maps_of(places, 1), probe=PROBE)
+    assert cnr_map_figure(result.maps[0], PROBE.length_m).startswith(b"\x89PNG")
+
+
+def write_map(path: Path, found: CnrMap) -> None:
+    rays = found.azimuth_deg.size
+    records = Records(
+        time_utc=np.datetime64("2014-05-01T00:00:00", "ns") + np.arange(rays) * np.timedelta64(100, "ms"),
+        duration_s=np.full(rays, 0.1),
+        azimuth_deg=np.mod(found.azimuth_deg, 360.0),
+        elevation_deg=found.elevation_deg,
+        scan_id=np.zeros(rays, int),
+        sweep_id=np.zeros(rays, int),
+        range_m=found.range_m,
+        radial_speed_mps=np.zeros_like(found.cnr_db),
+        cnr_db=found.cnr_db,
+    )
+    to_wide(records).to_csv(path, index=False)
+
+
+def lidarplan(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from planner.cli import main; main()", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=False)
+
+
+def test_the_commands_plan_a_map_and_write_what_maps_tell_so_that_pointing_changes(
+    places: Places, site_file: Path
+) -> None:
+    plan = json.loads(
+        lidarplan("cnr-map", "plan", str(site_file), "--lidar", "L", "--target", "tip S", "--json").stdout
+    )
+    assert plan["maps"][0]["time_s"] > 60
+    named = []
+    for number, (name, found) in enumerate(maps_of(places, 7)):
+        path = site_file.parent / f"map{number}.csv"
+        write_map(path, found)
+        named.append(f"{name}={path}")
+    refused = lidarplan("cnr-map", "fit", named[0], "--site", str(site_file), "--lidar", "L", "--write")
+    assert refused.returncode == 2
+    assert "do not determine" in refused.stderr
+    assert site_file.read_text(encoding="utf-8") == SITE
+    done = lidarplan("cnr-map", "fit", *named, "--site", str(site_file), "--lidar", "L", "--write", "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["site_keys"]["azimuth_offset_deg"] == pytest.approx(12.35, abs=0.01)
+    pointed = json.loads(lidarplan("point", str(site_file), "--json").stdout)
+    (row,) = [row for row in pointed if row["lidar"] == "L"]
+    wanted = planted(places).to_head(row["azimuth_true_deg"], row["elevation_deg"])
+    assert abs(float(difference_deg(row["azimuth_head_deg"], wanted[0]))) < 0.01
+    assert abs(row["elevation_head_deg"] - float(wanted[1])) < 0.01
