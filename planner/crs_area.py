@@ -94,3 +94,19 @@ def _where(frame: SiteFrame, place: Place) -> str:
     except InputError:
         return "This one is off the map."
     return f"This one is at longitude {float(longitude):.2f}°, latitude {float(latitude):.2f}°."
+
+
+def is_transverse_mercator(crs: str) -> bool:
+    """Whether a projected CRS is a zone of a transverse Mercator projection, such as UTM.
+
+    Examples
+    --------
+    >>> is_transverse_mercator("EPSG:25832"), is_transverse_mercator("EPSG:2154")
+    (True, False)
+    """
+    from pyproj import CRS
+
+    own = CRS.from_user_input(crs)
+    projected = own.sub_crs_list[0] if own.is_compound else own
+    operation = projected.coordinate_operation
+    return operation is not None and operation.method_name.startswith("Transverse Mercator")

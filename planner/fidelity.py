@@ -30,7 +30,7 @@ class Effect:
 GEOMETRY_TEXTS = {
     "convergence": "grid north is not true north",
     "scale": "grid distance is not ground distance",
-    "curvature": "the ground falls away under a level beam",
+    "curvature": "the ground falls away under a level beam; concerns maps, wakes and predictions: pointing is exact",
     "refraction": "the beam bends down; reported beside the elevation, never inside it",
     "geoid": "heights above sea level are taken for ellipsoidal ones",
     "deflection-of-vertical": "the plumb line is not the ellipsoid's normal; a bound, and no model here has it",

@@ -1,4 +1,4 @@
-"""Which rays of each scan meet a rotor, a tower, a mast or an obstacle on their way to the gate."""
+"""Which rays of each scan meet a rotor, a tower, a mast, an obstacle or the ground on their way to the gate."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import ArrayLike, BoolArray, FloatArray
+from geometry.earth import EARTH_RADIUS_M
 from geometry.sightlines import clearance
 from geometry.solids import Boxes, Cylinders, Solids, Spheres
 from planner.places import Places
@@ -26,12 +27,13 @@ class Obstruction:
 
     scan: str
     thing: str
-    part: str  # rotor, tower, mast or obstacle
+    part: str  # rotor, tower, mast, obstacle or ground
     rays: int
     lost: BoolArray  # (ray,) True where the ray touches
     lost_azimuth_deg: FloatArray  # (lost ray,) true
+    lost_elevation_deg: FloatArray  # (lost ray,) above the horizontal at the head
     clearance_m: float  # smallest over the rays; negative is the depth inside
-    range_m: float  # where it is smallest
+    range_m: float  # where it is smallest; of the ground, where the first of the lost rays meets it
     margin_m: float  # how far the beam may be off there: twice its pointing and position uncertainty
 
     @property
@@ -51,10 +53,7 @@ class _Things(NamedTuple):
 def obstructions(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[Obstruction, ...]:
     """Everything that a ray of some scan touches or passes within its margin."""
     return tuple(
-        found
-        for layout in layouts
-        for things in _around(places, layout)
-        for found in _of_kind(layout, things)
+        found for layout in layouts for found in (*_of_solids(places, layout), *_of_ground(places, layout))
     )
 
 
@@ -92,6 +91,75 @@ def margin_m(lidar: Lidar, range_m: float) -> float:
     return MARGIN_STDS * float(np.hypot(unsure.position_m, off_m))
 
 
+def ground_met_m(height_m: float, elevation_deg: ArrayLike) -> FloatArray:
+    """Where straight beams first meet level ground that curves with the Earth.
+
+    Parameters
+    ----------
+    height_m
+        Height of the head above the ground [m], at least 0.
+    elevation_deg
+        (...,) elevations [deg], upwards positive.
+
+    Returns
+    -------
+    FloatArray
+        (...,) slant range [m], the smaller root r of h + r sin φ + (r cos φ)²/2R = 0; infinite where the beam
+        stays above the ground.
+
+    Examples
+    --------
+    >>> ground_met_m(10.0, [-1.0, -0.05, 0.0, 3.0]).round(1).tolist()
+    [574.5, inf, inf, inf]
+    """
+    elevation = np.deg2rad(np.asarray(elevation_deg, dtype=np.float64))
+    down, bend = -np.sin(elevation), 2 * height_m * np.cos(elevation) ** 2 / EARTH_RADIUS_M
+    meets = (down > 0.0) & (down**2 >= bend)
+    root = down + np.sqrt(np.where(meets, down**2 - bend, 0.0))
+    return np.where(meets, 2 * height_m / np.where(meets, root, 1.0), np.inf)
+
+
+def _of_ground(places: Places, layout: ScanLayout) -> Iterator[Obstruction]:
+    """Rays that meet the level ground; not where a terrain says that it is not level.
+
+    A head that is declared a little below the ground stands on it. A target below the ground is a fault of
+    its own.
+    """
+    site, scan = places.site, layout.scan
+    targets_m = [site.target_position_m(name)[2] for name in layout.targets]
+    if site.terrain is not None or any(height_m <= site.ground_m for height_m in targets_m):
+        return
+    height_m = max(layout.lidar.position[2] - site.ground_m, 0.0)
+    lowest_deg = scan.elevation_deg - np.abs(scan.swept_elevation_deg) / 2
+    met_m, wanted_m = ground_met_m(height_m, lowest_deg), reach_m(layout)
+    lost = met_m < wanted_m
+    if not lost.any():
+        return
+    elevation = np.deg2rad(lowest_deg)
+    end_m = (
+        height_m + wanted_m * np.sin(elevation) + (wanted_m * np.cos(elevation)) ** 2 / (2 * EARTH_RADIUS_M)
+    )
+    range_m = float(met_m[lost].min())
+    yield Obstruction(
+        scan=layout.name,
+        thing="the ground",
+        part="ground",
+        rays=scan.count,
+        lost=lost,
+        lost_azimuth_deg=scan.azimuth_deg[lost],
+        lost_elevation_deg=scan.elevation_deg[lost],
+        clearance_m=min(float(end_m[lost].min()), 0.0),
+        range_m=range_m,
+        margin_m=margin_m(layout.lidar, range_m),
+    )
+
+
+def _of_solids(places: Places, layout: ScanLayout) -> Iterator[Obstruction]:
+    """What a scan touches or nearly touches of everything that stands on the site."""
+    for things in _around(places, layout):
+        yield from _of_kind(layout, things)
+
+
 def _of_kind(layout: ScanLayout, things: _Things) -> Iterator[Obstruction]:
     """What a scan touches or nearly touches of one kind of solids."""
     scan = layout.scan
@@ -117,6 +185,7 @@ def _of_kind(layout: ScanLayout, things: _Things) -> Iterator[Obstruction]:
                 rays=scan.count,
                 lost=clear_m <= 0.0,
                 lost_azimuth_deg=scan.azimuth_deg[clear_m <= 0.0],
+                lost_elevation_deg=scan.elevation_deg[clear_m <= 0.0],
                 clearance_m=float(clear_m[ray]),
                 range_m=range_m,
                 margin_m=margin,

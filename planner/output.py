@@ -37,6 +37,7 @@ def output_folder(folder: Path) -> Iterator[Path]:
     InputError
         If the folder cannot be written to: said before the block runs.
     """
+    require_folder(folder)
     parent = _nearest_folder(folder)
     try:
         staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=parent))
@@ -47,6 +48,21 @@ def output_folder(folder: Path) -> Iterator[Path]:
         _move_all(staging, folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+
+
+def require_folder(folder: Path) -> None:
+    """Refuse a folder for results that cannot be made or written to, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        If it, or what stands in its place above it, is a file or closed to writing. Nothing is left behind.
+    """
+    place = folder if folder.is_dir() else _nearest_folder(folder)
+    try:
+        Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=place)).rmdir()
+    except OSError as error:
+        raise _refusal(folder, error) from error
 
 
 def write_text(path: Path, text: str) -> None:
@@ -134,7 +150,10 @@ def _nearest_folder(folder: Path) -> Path:
     """Find the nearest existing folder above a folder: on the same disk as the folder will be."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; a folder is needed for the results. Give another place.")
-    return next((parent for parent in folder.absolute().parents if parent.is_dir()), Path())
+    above = next((parent for parent in folder.absolute().parents if parent.exists()), Path())
+    if not above.is_dir():
+        raise InputError(f"{folder} cannot be made: {above} is a file, not a folder. Give another place.")
+    return above
 
 
 def _umask() -> int:

@@ -28,6 +28,7 @@ CLOSE_UP_M = 150.0  # half of what is seen around the first target
 ASPECT = 1.2  # width of the overview over its height
 FIELD_DEG = 45.0  # vertical field of view: plotly's own, so that page and picture begin alike
 LONGEST = 20  # characters of a name in the scene; the tables have it whole
+SHORTEST = 8  # of a name beside a text that has to be read whole
 ROOM = 0.09  # share of the overview left free on each side, for names at its border
 RING_LIFT = 0.02  # of the ring's radius: nearer to the ground it flickers in a browser
 WAKE_LIFT_M = 0.5  # wakes end above the ground: two surfaces in one place flicker
@@ -258,8 +259,17 @@ def _crossing(plan: Plan, met: PairCrossing) -> Iterator[Layer]:
     lines = [beam_line(plan.places, plan.layout[name], met.target) for name in (met.scan1, met.scan2)]
     points = cross(*lines[0], *lines[1])
     if np.all(np.isfinite([points.point1_m, points.point2_m])):
-        text = f"{_short(met.pair)}: {met.opening_angle_deg:.0f}°, gap {met.gap_m:.1f} m"
-        yield layers.crossing_layer("crossing", text, points.point1_m, points.point2_m, ground_m=GROUND_M)
+        yield layers.crossing_layer(
+            "crossing", _met(plan, met), points.point1_m, points.point2_m, ground_m=GROUND_M
+        )
+
+
+def _met(plan: Plan, met: PairCrossing) -> str:
+    """What is written where two beams meet: the gap, or how far they pass the target where that matters more."""
+    miss_m = met.worst_aimed[1]
+    if miss_m <= plan.site.tolerance.position_m:
+        return f"{_short(met.pair)}: {met.opening_angle_deg:.0f}°, gap {met.gap_m:.1f} m"
+    return f"{_short(met.pair, SHORTEST)}: {met.opening_angle_deg:.0f}°, misses target by {miss_m:.0f} m"
 
 
 def _close_ups(plan: Plan, overview: View, hidden: tuple[str, ...]) -> Iterator[View]:

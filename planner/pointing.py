@@ -24,7 +24,7 @@ class Pointing(NamedTuple):
     elevation_deg: float  # above the horizontal at the head, of the straight line
     elevation_head_deg: float
     range_m: float
-    gate_index: int | None  # of the lidar's scan at this target; None without gates there
+    gate_index: int | None  # of the lidar's scan at this target; None where no gate reaches it
     gate_centre_m: float | None
     convergence_deg: float
     refraction_deg: float  # to add to the elevation: the beam bends down by so much; not in elevation_deg
@@ -76,7 +76,7 @@ def point(places: Places, lidar: Lidar, target: str, layout: ScanLayout | None) 
     azimuth_deg, elevation_deg, range_m = (float(value) for value in beam)
     head_azimuth, head_elevation = places.mounting(lidar).to_head(azimuth_deg, elevation_deg)
     convergence_deg = places.convergence_deg(lidar)
-    gate = None if layout is None else layout.gate_at(range_m)
+    gate = None if layout is None else _gate_around(layout, range_m)
     return Pointing(
         lidar=lidar.name,
         target=target,
@@ -92,6 +92,15 @@ def point(places: Places, lidar: Lidar, target: str, layout: ScanLayout | None) 
         refraction_deg=float(np.rad2deg(refraction_lift_m(range_m) / range_m)) if range_m else 0.0,
         scan=None if layout is None else layout.name,
     )
+
+
+def _gate_around(layout: ScanLayout, range_m: float) -> tuple[int, float] | None:
+    """Index and true centre [m] of the gate that a range lies in: half a spacing to each side of its centre."""
+    gate = layout.gate_at(range_m)
+    if gate is None or layout.gates is None:
+        return None
+    index, centre_m, offset_m = gate
+    return None if abs(offset_m) > layout.gates.spacing_m / 2 * (1 + 1e-9) else (index, centre_m)
 
 
 def _scan_at(layouts: tuple[ScanLayout, ...], lidar: str, target: str) -> ScanLayout | None:

@@ -74,26 +74,51 @@ class Predicted:
         progress: Progress | None = None,
     ) -> tuple[ErrorCurve, ...]:
         """Predict every sector scan at each of its targets, for each size, then every pair: see `Plan.errors`."""
-        site, simpler = self.places.site, left_out(self.fidelity)
-        chosen = tier or default_tier(site, simpler)
-        sectors = [
+        sectors = self.sector_errors(tier=tier, sizes_deg=sizes_deg, sizes_from=sizes_from, progress=progress)
+        return (*sectors, *self.pair_errors(tier=tier, progress=progress))
+
+    def sector_errors(
+        self,
+        *,
+        tier: Tier | None = None,
+        sizes_deg: Sequence[float] | None = None,
+        sizes_from: SizesFrom = "own",
+        progress: Progress | None = None,
+    ) -> tuple[ErrorCurve, ...]:
+        """Predict every sector scan at each of its targets, for each size."""
+        return tuple(
             sector_curve(
                 self.places,
                 layout,
                 item,
-                tier=chosen,
+                tier=tier or self._tier,
                 sizes_deg=sizes_deg,
                 sizes_from=sizes_from,
-                left_out=simpler,
+                left_out=left_out(self.fidelity),
                 progress=progress,
             )
             for item, layout in self._sectors
-        ]
-        pairs = [
-            pair_curve(self.places, pair, *self._pair(pair), tier=chosen, left_out=simpler, progress=progress)
-            for pair in site.pairs
-        ]
-        return (*sectors, *pairs)
+        )
+
+    def pair_errors(
+        self, *, tier: Tier | None = None, progress: Progress | None = None
+    ) -> tuple[ErrorCurve, ...]:
+        """Predict every pair at its target."""
+        return tuple(
+            pair_curve(
+                self.places,
+                pair,
+                *self._pair(pair),
+                tier=tier or self._tier,
+                left_out=left_out(self.fidelity),
+                progress=progress,
+            )
+            for pair in self.places.site.pairs
+        )
+
+    @property
+    def _tier(self) -> Tier:
+        return default_tier(self.places.site, left_out(self.fidelity))
 
     @cached_property
     def _sectors(self) -> tuple[tuple[Exclusion, ScanLayout], ...]:

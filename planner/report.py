@@ -22,6 +22,7 @@ from planner import palette
 from planner.assumptions import assumptions
 from planner.checks import findings
 from planner.error_entry import Entry, error_entries
+from planner.error_nouns import ErrorCurve
 from planner.exclusion import Exclusion
 from planner.figures.canvas import DPI
 from planner.figures.map_layers import most_lost
@@ -34,7 +35,8 @@ from planner.output import output_folder
 from planner.plan import Plan
 from planner.plan_scene import plan_scene
 from planner.report_errors import tier_curve
-from planner.report_numbers import KeyNumber, finding_counts, key_numbers
+from planner.report_numbers import MISSES, KeyNumber, finding_counts, key_numbers
+from planner.report_site import made_line, position_table, wind_table
 from planner.report_tables import (
     budget_table,
     crossing_table,
@@ -51,6 +53,7 @@ from planner.report_tables import (
 )
 from planner.report_values import DASH, Column, Table, csv_text, percent, quantity
 from planner.scene import Scene, opengl
+from planner.site import Site
 from planner.tradeoff import Trade
 
 PAGE = "report.html"
@@ -68,6 +71,9 @@ class SiteReport:
     plan: Plan
     number: int  # on the page, from 1
     trades: Sequence[Trade] = ()  # measured beforehand, or none
+    predicted: Callable[[], Sequence[ErrorCurve]] | None = (
+        None  # errors from another process; None: made here
+    )
 
     @cached_property
     def findings(self) -> list[Finding]:
@@ -77,7 +83,14 @@ class SiteReport:
     @cached_property
     def errors(self) -> list[Entry]:
         """Every predicted curve."""
-        return error_entries(self.plan)
+        if self.predicted is None:
+            return error_entries(self.plan, self.plan.default_errors)
+        return error_entries(self.plan, [*self.predicted(), *self.pair_errors])
+
+    @cached_property
+    def pair_errors(self) -> Sequence[ErrorCurve]:
+        """Errors of the pairs, which are predicted here while a child process predicts the sectors."""
+        return self.plan.predicted.pair_errors()
 
     @cached_property
     def numbers(self) -> list[KeyNumber]:
@@ -95,6 +108,8 @@ class SiteReport:
             errors_table(self.errors),
             scan_table(self.plan),
             fidelity_table(self.plan.fidelity),
+            position_table(self.plan),
+            wind_table(self.plan),
         )
         return {table.name: table for table in made}
 
@@ -102,6 +117,17 @@ class SiteReport:
     def scene(self) -> Scene:
         """The 3-D scene."""
         return plan_scene(self.plan)
+
+    def draw(self) -> None:
+        """Make now all that does not wait for the sectors' errors."""
+        _ = (self.pictures, self.findings, self.plan.fidelity, self.plan.budgets)
+        if self.predicted is not None:
+            _ = self.pair_errors
+
+    @cached_property
+    def pictures(self) -> dict[str, object]:
+        """What is drawn and needs no prediction: map, roses and scene."""
+        return {"map": site_map(self.plan), "rose": wake_rose(self.plan), **_scene_part(self)}
 
 
 CSV_TABLES = ("pointing", "findings", "wakes", "crossings", "errors")
@@ -112,6 +138,7 @@ def write_report(
     folder: Path,
     *,
     trades: Sequence[Sequence[Trade]] = (),
+    aside: bool = False,
     progress: Progress = lambda _: None,
 ) -> list[Path]:
     """Write the report of one or two plans: `report.html` and its tables as CSV.
@@ -124,6 +151,9 @@ def write_report(
         Where the files go; they appear there all together, or none of them.
     trades
         For each plan what `Plan.trades` measured; without it the page says how to measure it.
+    aside
+        Predict errors in a process of their own while this one draws. A script that calls this needs the usual
+        `if __name__ == "__main__":` then.
     progress
         Is told what is being done.
 
@@ -138,11 +168,16 @@ def write_report(
         If the folder cannot be written to, or a plan's numbers make no report.
     """
     measured = list(trades) or [()] * len(plans)
-    reports = [
-        SiteReport(plan, number, rows)
-        for number, (plan, rows) in enumerate(zip(plans, measured, strict=True), start=1)
-    ]
-    with output_folder(folder) as staging, _asking_for_opengl():
+    with output_folder(folder) as staging, _asking_for_opengl(), _predicting(plans, aside=aside) as predicted:
+        reports = [
+            SiteReport(plan, number, rows, curves)
+            for number, (plan, rows, curves) in enumerate(
+                zip(plans, measured, predicted, strict=True), start=1
+            )
+        ]
+        for report in reports:
+            progress(f"{report.plan.site.name}: figures and scene")
+            report.draw()  # while the errors are predicted
         texts = {f"{name}.csv": _csv(reports, name) for name in CSV_TABLES}
         texts = {PAGE: _page(reports, progress), **texts}
         for name, text in texts.items():
@@ -158,6 +193,31 @@ def _asking_for_opengl() -> Iterator[None]:
     with ThreadPoolExecutor(max_workers=1) as pool:
         pool.submit(opengl.off_screen_window)
         yield
+
+
+Curves = Callable[[], Sequence[ErrorCurve]]
+
+
+@contextmanager
+def _predicting(plans: Sequence[Plan], *, aside: bool) -> Iterator[list[Curves | None]]:
+    """Predict the sectors' errors of plans in a child process, if asked to; leaving early ends the child."""
+    if not aside:
+        yield [None] * len(plans)
+        return
+    from multiprocessing import get_context
+
+    with get_context("spawn").Pool(1, _leave_interrupts_to_the_parent) as pool:
+        yield [pool.apply_async(_errors_of, (plan.site,)).get for plan in plans]
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _errors_of(site: Site) -> Sequence[ErrorCurve]:
+    return Plan(site).predicted.sector_errors()
 
 
 def report_html(plans: Sequence[Plan], *, progress: Progress = lambda _: None) -> str:
@@ -193,6 +253,7 @@ def _page(reports: Sequence[SiteReport], progress: Progress) -> str:
     return template.render(
         sites=[{**site, "scene_div": Markup(site["scene_div"])} for site in sites],
         rows=list(zip(*(report.numbers for report in reports), strict=True)),
+        made=made_line(),
         policy=_policy(scripts),
         palette=palette,
         quantity=quantity,
@@ -213,7 +274,7 @@ def _policy(scripts: Sequence[str]) -> str:
 def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
     """Everything that the template needs of one site."""
     plan = report.plan
-    progress(f"{plan.site.name}: tables and figures")
+    progress(f"{plan.site.name}: errors and tables")
     numbers = {
         "number": report.number,
         "site": plan.site,
@@ -221,8 +282,6 @@ def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
         "summary": _summary(report),
         "numbers": report.numbers,
         "tables": report.tables,
-        "map": site_map(plan),
-        "rose": wake_rose(plan),
         "free": [_free_sentence(item) for item in most_lost(plan)],
         "errors": _error_parts(report.errors),
         "budgets": [budget_table(item) for item in plan.budgets],
@@ -231,8 +290,7 @@ def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
         "findings": report.findings,
         "convergence_deg": plan.convergence_deg,
     }
-    progress(f"{plan.site.name}: scene")
-    return {**numbers, **_scene_part(report)}
+    return {**numbers, **report.pictures}
 
 
 def _summary(report: SiteReport) -> str:
@@ -241,6 +299,7 @@ def _summary(report: SiteReport) -> str:
     parts = [f"{finding_counts(report.findings).capitalize()}", main["on the site"]]
     for label, words in (
         ("opening angle of pairs [°]", "opening angle {}°"),
+        (MISSES, "beams that miss their target: {}"),
         ("of that wind lost to wakes, worst scan", "{} of the wanted wind lost to wakes"),
         ("recommended sector", "recommended sector {}"),
     ):
@@ -271,6 +330,11 @@ def _error_parts(entries: Sequence[Entry]) -> list[dict[str, object]]:
             {
                 "title": "Pairs",
                 "entry": pairs[0],
+                "blocked": [
+                    f"{entry['scan']}: {entry['blocked_remark']}"
+                    for entry in pairs
+                    if entry["blocked_remark"]
+                ],
                 "best": None,
                 "table": pair_table(pairs),
                 "figure": None,
@@ -291,6 +355,7 @@ def _sector_part(entry: Entry) -> dict[str, object]:
     return {
         "title": title,
         "entry": entry,
+        "blocked": [entry["blocked_remark"]] if entry["blocked_remark"] else [],
         "best": sizes.index(best) if best is not None and best in sizes else None,
         "table": size_table(entry),
         "figure": figure,

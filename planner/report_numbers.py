@@ -4,14 +4,16 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from planner.error_entry import Entry
+from planner.error_entry import Entry, rays_lost
 from planner.finding import SEVERITIES, Finding
 from planner.plan import Plan
 from planner.report_errors import recommended_size
-from planner.report_tables import TEN_MINUTES_S, directions, rays_lost
+from planner.report_tables import TEN_MINUTES_S, directions
 from planner.report_values import DASH, fixed, percent
 
 WORDS = {"error": ("error", "errors"), "warning": ("warning", "warnings"), "info": ("remark", "remarks")}
+
+MISSES = "beams of pairs that pass their target"
 
 
 class KeyNumber(NamedTuple):
@@ -68,13 +70,23 @@ def _layout(plan: Plan) -> Iterator[KeyNumber]:
     yield KeyNumber("range to the targets scanned [m]", _between(ranges, 0))
     yield KeyNumber("opening angle of pairs [°]", _between([item.opening_angle_deg for item in met], 0))
     yield KeyNumber("gap between the beams of pairs [m]", _between([item.gap_m for item in met], 2))
+    yield KeyNumber(MISSES, _misses(plan))
+
+
+def _misses(plan: Plan) -> str:
+    """How far the worse beam of each pair passes its target, where that is more than the position tolerance."""
+    tolerance_m = plan.site.tolerance.position_m
+    far = [(met, *met.worst_aimed) for met in plan.crossings if met.worst_aimed[1] > tolerance_m]
+    if not far:
+        return f"none by more than {tolerance_m:g} m" if plan.crossings else DASH
+    return ", ".join(f"{fixed(miss_m, 1)} m ({lidar}, {met.pair})" for met, lidar, miss_m in far)
 
 
 def _scanning(plan: Plan) -> Iterator[KeyNumber]:
     counts = [float(layout.scan.scans_in(TEN_MINUTES_S)) for layout in plan.layouts]
     yield KeyNumber("scans in ten minutes", _between(counts, 0))
     rays = sum(layout.scan.count for layout in plan.layouts)
-    lost = sum(rays_lost(plan, layout) for layout in plan.layouts)
+    lost = sum(rays_lost(plan, layout.name) for layout in plan.layouts)
     yield KeyNumber("rays lost to rotors, towers, masts, obstacles", f"{lost} of {rays}" if rays else DASH)
 
 

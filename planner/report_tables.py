@@ -8,6 +8,7 @@ import numpy as np
 from geometry.angles import SectorSet
 from geometry.gates import unambiguous_range_m
 from planner.budget import Budget
+from planner.error_entry import rays_lost
 from planner.exclusion import DEFICIT_STEP_DEG, Exclusion
 from planner.fidelity import Effect
 from planner.finding import Finding
@@ -238,19 +239,13 @@ def _scan_row(plan: Plan, layout: ScanLayout) -> tuple[Value, ...]:
         layout.spec.period_s,
         layout.scan.measured_period_s,
         layout.scan.scans_in(TEN_MINUTES_S),
-        rays_lost(plan, layout),
+        rays_lost(plan, layout.name),
         layout.probe.length_m,
         None if gates is None else gates.count,
         None if gates is None else gates.first_m,
         None if gates is None else gates.last_m,
         None if pulse is None else float(unambiguous_range_m(pulse.pulse_repetition_hz)),
     )
-
-
-def rays_lost(plan: Plan, layout: ScanLayout) -> int:
-    """Number of a scan's rays that touch something solid on their way."""
-    lost = [met.lost for met in plan.obstructions if met.scan == layout.name]
-    return int(np.any(lost, axis=0).sum()) if lost else 0
 
 
 def fidelity_table(effects: Sequence[Effect]) -> Table:
@@ -301,10 +296,12 @@ def budget_table(budget: Budget) -> Table:
         )
         for entry in budget.entries
     )
-    wind = f"wind {budget.wind.speed_mps:.1f} m/s from {budget.wind.from_deg:.0f}°"
-    return Table(
-        "budget", f"{budget.scan} → {budget.target}: uncertainty of ten-minute means, {wind}", BUDGET, rows
+    wind = f"{budget.wind.speed_mps:.1f} m/s from {budget.wind.from_deg:.0f}°"
+    caption = (
+        f"{budget.scan} → {budget.target}: uncertainty of ten-minute means, for the declared size and one state of "
+        f"the wind, {wind}; the scatter over the climate, above, is over all states and differs"
     )
+    return Table("budget", caption, BUDGET, rows)
 
 
 def pair_table(entries: Sequence[Mapping[str, Any]]) -> Table:

@@ -26,6 +26,7 @@ def faults_of(raw: Raw) -> list[Fault]:
     checks: tuple[Callable[[Raw], Iterator[Fault]], ...] = (
         _names,
         _references,
+        _pairs,
         _instruments,
         _one_of,
         _aims,
@@ -85,6 +86,28 @@ def _references(raw: Raw) -> Iterator[Fault]:
             names = item.get(field)
             for place, name in enumerate(names if isinstance(names, list | tuple) else ()):
                 yield from _reference(raw, (key, index, field, place), name, where)
+
+
+def _pairs(raw: Raw) -> Iterator[Fault]:
+    """A pair that names one scan twice, or two scans of one lidar: its beams do not cross."""
+    lidar_of = {
+        name.strip(): lidar.strip()
+        for _, item in entries(raw, "scans")
+        if isinstance(name := item.get("name"), str) and isinstance(lidar := item.get("lidar"), str)
+    }
+    for index, item in entries(raw, "pairs"):
+        names = item.get("scans")
+        taken: dict[str, str] = {}
+        seen: set[str] = set()
+        for place, name in enumerate(names if isinstance(names, list | tuple) else ()):
+            if not isinstance(name, str) or (lidar := lidar_of.get(name.strip())) is None:
+                continue
+            if lidar in taken:
+                twice = name.strip() in seen
+                has = "it is named twice" if twice else f"{taken[lidar]} is a scan of {lidar} too"
+                yield Fault(("pairs", index, "scans", place), name, f"a scan of another lidar ({has})")
+            taken.setdefault(lidar, name.strip())
+            seen.add(name.strip())
 
 
 def _instruments(raw: Raw) -> Iterator[Fault]:

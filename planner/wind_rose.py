@@ -15,6 +15,9 @@ from planner.site import Site
 UNIFORM_RESULTANT = 0.05
 
 WEIBULL_COLUMNS = ("weibull_scale_mps", "weibull_shape")
+# Shares are rounded; a sum farther off is a lost row or another quantity.
+SUM_TOLERANCE = 0.01
+
 COLUMNS = "direction_deg, share and, optionally, weibull_scale_mps with weibull_shape"
 
 
@@ -59,7 +62,7 @@ def load_rose(path: Path) -> Rose:
     Parameters
     ----------
     path
-        A CSV of direction_deg (middles of equal sectors), share (in any unit; made to add up to 1) and,
+        A CSV of direction_deg (middles of equal sectors), share (parts of 1, or per cent) and,
         optionally, weibull_scale_mps with weibull_shape.
 
     Returns
@@ -71,7 +74,7 @@ def load_rose(path: Path) -> Rose:
     ------
     InputError
         If the file cannot be read, a column is missing, the directions are not equal sectors around the whole
-        circle, or a number is negative or missing.
+        circle, the shares add up neither to 1 nor to 100, or a number is negative or missing.
     """
     try:
         state = path.stat()
@@ -132,6 +135,12 @@ def _check_numbers(
     if not (np.isfinite(share).all() and (share >= 0).all() and share.sum() > 0):
         raise InputError(
             f"wind rose {path}: the shares {share.tolist()} have to be numbers, 0 or larger, and not all 0"
+        )
+    total = float(share.sum())
+    if min(abs(total - 1.0), abs(total / 100.0 - 1.0)) > SUM_TOLERANCE:
+        raise InputError(
+            f"wind rose {path}: the shares add up to {total:g}; they have to add up to 1, or to 100 as per cent, "
+            f"within {SUM_TOLERANCE:.0%}: look for a missing sector, or divide by {total:g}"
         )
     for name, values in zip(WEIBULL_COLUMNS, (scale_mps, shape), strict=True):
         if values is not None and not (np.isfinite(values).all() and (values > 0).all()):

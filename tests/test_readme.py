@@ -33,8 +33,11 @@ def test_library_example_prints_what_its_comment_says(capsys):
     "arguments", [line for line in shell_lines() if line[0] not in ELSEWHERE], ids=" ".join
 )
 def test_command_of_the_tour_runs(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
     if arguments[0] == "new":
         arguments = ["new", str(tmp_path / "campaign")]
+    if arguments[0] == "export":
+        arguments = [*arguments, "--out", str(tmp_path)]
     assert run(arguments) in (0, 1) if arguments[0] == "check" else run(arguments) == 0
     assert capsys.readouterr().out.strip()
 

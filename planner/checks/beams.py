@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
-from planner.finding import Finding
+from planner.aiming import outside_sweep
+from planner.finding import Finding, Severity
 from planner.plan import Plan
-from planner.scan_layout import ScanLayout
+from planner.scan_layout import DEFAULT_PULSE_NS, ScanLayout
 
 # What air over flat land moves up or down in a ten-minute mean; used where less is declared.
 VERTICAL_WIND_MPS = 0.1
@@ -29,6 +30,7 @@ def find(plan: Plan) -> Iterator[Finding]:
         yield from _elevation(layout)
         yield from _vertical_wind(plan, layout)
         yield from _aim(layout)
+    yield from _unknown_pulses(plan)
 
 
 def _range(layout: ScanLayout, target: str) -> Iterator[Finding]:
@@ -51,15 +53,7 @@ def _range(layout: ScanLayout, target: str) -> Iterator[Finding]:
 
 def _ambiguous(layout: ScanLayout) -> Iterator[Finding]:
     """Farthest target or gate against the unambiguous range of the pulse."""
-    if layout.pulse is None:
-        device = layout.lidar.device
-        known = ", ".join(f"{mode.pulse_ns:g}" for mode in device.pulses if mode.pulse_ns) or "none known"
-        text = (
-            f"{device.name} has no pulse of {layout.probe.pulse_ns:g} ns in the catalogue (it has: {known}), "
-            "so its unambiguous range is not checked: correct pulse_ns, or give the instrument's pulses in "
-            "the site file"
-        )
-        yield Finding("warning", "pulse-unknown", layout.name, layout.probe.pulse_ns, "ns", None, text)
+    if layout.pulse is None:  # `pulse-unknown`
         return
     limit_m, kilohertz = layout.unambiguous_range_m, layout.pulse.pulse_repetition_hz / 1000
     if limit_m is not None and layout.farthest_m > limit_m:
@@ -69,6 +63,25 @@ def _ambiguous(layout: ScanLayout) -> Iterator[Finding]:
             "gates"
         )
         yield Finding("error", "range-ambiguous", layout.name, layout.farthest_m, "m", limit_m, text)
+
+
+def _unknown_pulses(plan: Plan) -> Iterator[Finding]:
+    """Pulses of which the instrument's numbers say nothing, once for each instrument and pulse."""
+    unknown = [layout for layout in plan.layouts if layout.pulse is None]
+    for name, pulse_ns in dict.fromkeys((each.lidar.device.name, each.spec.pulse_ns) for each in unknown):
+        alike = [each for each in unknown if (each.lidar.device.name, each.spec.pulse_ns) == (name, pulse_ns)]
+        modes = {mode.pulse_ns for each in alike for mode in each.lidar.device.pulses if mode.pulse_ns}
+        known = ", ".join(f"{mode:g}" for mode in sorted(modes)) or "none known"
+        scans = ", ".join(each.name for each in alike)
+        said = (
+            f"{DEFAULT_PULSE_NS:g} ns are taken for the pulse, because neither the scan ({scans}) nor {name} "
+            "names one; its unambiguous range is not checked: give pulse_ns"
+            if pulse_ns is None
+            else f"{name} has no pulse of {pulse_ns:g} ns in the catalogue (it has: {known}), so the unambiguous "
+            f"range of {scans} is not checked: correct pulse_ns"
+        )
+        text = f"{said}, or give the instrument's pulses in the site file"
+        yield Finding("warning", "pulse-unknown", name, alike[0].probe.pulse_ns, "ns", None, text)
 
 
 def _gate(layout: ScanLayout, target: str) -> Iterator[Finding]:
@@ -144,11 +157,20 @@ def _vertical_wind(plan: Plan, layout: ScanLayout) -> Iterator[Finding]:
 
 def _aim(layout: ScanLayout) -> Iterator[Finding]:
     """Declared head angles against the direction of the target."""
-    off_deg, miss_m = layout.aim_error_deg, layout.aim_miss_m
-    if off_deg is not None and off_deg > AIM_TOLERANCE_DEG:
-        text = (
-            f"the declared head angles point {off_deg:.2f}° beside target {layout.targets[0]} ({miss_m:.0f} "
-            f"m there), over {AIM_TOLERANCE_DEG:g}°: check azimuth_head_deg, elevation_head_deg and the "
-            "lidar's offsets, or leave the head angles out"
-        )
-        yield Finding("warning", "aim", layout.name, off_deg, "deg", AIM_TOLERANCE_DEG, text)
+    off_deg, miss_m, outside = layout.aim_error_deg, layout.aim_miss_m, outside_sweep(layout)
+    if off_deg is None or outside is None or off_deg <= AIM_TOLERANCE_DEG:
+        return
+    probe_m = layout.probe.length_m
+    beside_sector = layout.spec.type == "sector" and outside.azimuth_deg > 0.0
+    severity: Severity = "error" if beside_sector or outside.miss_m > probe_m else "warning"
+    sweep = (
+        f", and the scan passes it: {outside.miss_m:.0f} m at its nearest, with a probe of {probe_m:.0f} m"
+        if severity == "error"
+        else ""
+    )
+    text = (
+        f"the declared head angles point {off_deg:.2f}° beside target {layout.targets[0]} ({miss_m:.0f} "
+        f"m there), over {AIM_TOLERANCE_DEG:g}°{sweep}: check azimuth_head_deg, elevation_head_deg and the "
+        "lidar's offsets, or leave the head angles out"
+    )
+    yield Finding(severity, "aim", layout.name, off_deg, "deg", AIM_TOLERANCE_DEG, text)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from planner.crs_area import is_transverse_mercator
 from planner.finding import Finding
 from planner.plan import Plan
 
@@ -9,6 +10,8 @@ from planner.plan import Plan
 FAR_FROM_MERIDIAN_DEG = 3.5
 # Closer together, two lidars or two targets are one and the same.
 SAME_PLACE_M = 1.0
+# One level for the ground of a site is not more exact; farther below it a head's height is a slip.
+HEAD_BELOW_GROUND_M = 2.0
 
 
 def find(plan: Plan) -> Iterator[Finding]:
@@ -17,6 +20,8 @@ def find(plan: Plan) -> Iterator[Finding]:
     yield from _meridian(plan)
     yield from _same_place(plan)
     yield from _below_ground(plan)
+    yield from _heads(plan)
+    yield from _terrain(plan)
 
 
 def _area(plan: Plan) -> Iterator[Finding]:
@@ -41,11 +46,16 @@ def _meridian(plan: Plan) -> Iterator[Finding]:
     """Distance from the central meridian."""
     crs, off_deg = plan.site.crs, plan.from_meridian_deg
     if off_deg is not None and off_deg > FAR_FROM_MERIDIAN_DEG:
+        advice = (
+            "Pointing stays exact, but distances and angles taken from the map are off: take the "
+            "neighbouring zone"
+            if is_transverse_mercator(crs)
+            else "Pointing stays exact, but grid distances and flat maps are off: a local UTM zone would be closer"
+        )
         text = (
             f"the site is {off_deg:.1f}° from the central meridian of {crs}, over "
             f"{FAR_FROM_MERIDIAN_DEG:g}°, and its grid north is {plan.convergence_deg:.2f}° from true north. "
-            "Pointing stays exact, but distances and angles taken from the map are off: take the "
-            "neighbouring zone"
+            f"{advice}"
         )
         yield Finding("warning", "central-meridian", crs, off_deg, "deg", FAR_FROM_MERIDIAN_DEG, text)
 
@@ -71,3 +81,27 @@ def _below_ground(plan: Plan) -> Iterator[Finding]:
                 "height, ground_height_m and height_datum"
             )
             yield Finding("error", "target-height", target.name, above_m, "m", 0.0, text)
+
+
+def _heads(plan: Plan) -> Iterator[Finding]:
+    """Heads of the lidars against the ground."""
+    for lidar in plan.site.lidars:
+        above_m = lidar.position[2] - plan.site.ground_m
+        if above_m < -HEAD_BELOW_GROUND_M:
+            text = (
+                f"the head is {abs(above_m):.1f} m below the ground at {plan.site.ground_m:g} m, more than the "
+                f"{HEAD_BELOW_GROUND_M:g} m that uneven ground explains: check its height, ground_height_m and "
+                "height_datum"
+            )
+            yield Finding("warning", "head-height", lidar.name, above_m, "m", -HEAD_BELOW_GROUND_M, text)
+
+
+def _terrain(plan: Plan) -> Iterator[Finding]:
+    """A terrain is for placing; everything else takes one level."""
+    terrain = plan.site.terrain
+    if terrain is not None:
+        text = (
+            "heights of the terrain are used by `lidarplan place`; everywhere else the ground is level at "
+            f"{plan.site.ground_m:g} m, that of what stands lowest: look for hills in the beams on a map"
+        )
+        yield Finding("info", "terrain-partial", terrain.file.name, plan.site.ground_m, "m", None, text)

@@ -13,14 +13,14 @@ from planner.plan import Plan
 def find(plan: Plan) -> Iterator[Finding]:
     """Findings about rays lost to rotors, towers, masts and obstacles, and about near misses."""
     for met in plan.obstructions:
-        yield _lost(met) if met.lost_rays else _near(met)
+        yield _lost(plan, met) if met.lost_rays else _near(met)
 
 
-def _lost(met: Obstruction) -> Finding:
+def _lost(plan: Plan, met: Obstruction) -> Finding:
     """Rays that touch; all of them lost to something that stands still is an error."""
     turned = " (counted as turned to any wind)" if met.part == "rotor" else ""
     text = (
-        f"{_which(met)} lost to {_named(met)}{turned}, {met.range_m:.0f} m from the head, in every scan: "
+        f"{_which(plan, met)} lost to {_named(met)}{turned}, {met.range_m:.0f} m from the head, in every scan: "
         + (
             "move the lidar or the target"
             if met.rays == 1
@@ -44,19 +44,23 @@ def _near(met: Obstruction) -> Finding:
 
 def _named(met: Obstruction) -> str:
     """The thing in words: the rotor of stand 5, mast M1."""
+    if met.part == "ground":
+        return met.thing
     if met.part in ("rotor", "tower"):
         return f"the {met.part} of {met.thing}"
     return met.thing if met.thing.startswith(met.part) else f"{met.part} {met.thing}"
 
 
-def _which(met: Obstruction) -> str:
-    """The lost rays in words: how many, their numbers from 1, their azimuths."""
+def _which(plan: Plan, met: Obstruction) -> str:
+    """The lost rays in words: how many, their numbers from 1, their azimuths, of an RHI its elevations."""
     if met.rays == 1:
         return "the beam is"
-    first, last = met.lost_azimuth_deg[0], met.lost_azimuth_deg[-1]
+    upright = plan.layout[met.scan].spec.type == "rhi"
+    angles_deg = met.lost_elevation_deg if upright else met.lost_azimuth_deg
+    first, last = angles_deg[0], angles_deg[-1]
     alone = met.lost_rays == 1
-    azimuth = f"{first:.1f}°" if alone else f"{first:.1f} to {last:.1f}°"
-    numbers = f"{'number' if alone else 'numbers'} {_runs(met.lost)}, azimuth {azimuth}"
+    angle = f"{first:.1f}°" if alone else f"{first:.1f} to {last:.1f}°"
+    numbers = f"{'number' if alone else 'numbers'} {_runs(met.lost)}, {'elevation' if upright else 'azimuth'} {angle}"
     return f"{met.lost_rays} of {met.rays} rays ({numbers}) {'is' if alone else 'are'}"
 
 

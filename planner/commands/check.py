@@ -29,7 +29,9 @@ def check(
     from planner.commands.table import print_table
     from planner.finding import SEVERITIES
 
-    found = findings(load_plan(site, fidelity))
+    plan = load_plan(site, fidelity)
+    remark(f"site at {_where(*plan.longitude_latitude_deg)}", quiet=quiet)
+    found = findings(plan)
     counts = [sum(finding.severity == severity for finding in found) for severity in SEVERITIES]
     if json:
         say_json([finding._asdict() for finding in found])
@@ -44,3 +46,9 @@ def check(
     remark(f"{told}; docs/findings.md says what each code means.", quiet=quiet)
     if counts[0]:
         raise typer.Exit(1)
+
+
+def _where(longitude_deg: float, latitude_deg: float) -> str:
+    """Latitude and longitude in words: 56.44° N 8.15° E."""
+    north, east = "N" if latitude_deg >= 0 else "S", "E" if longitude_deg >= 0 else "W"
+    return f"{abs(latitude_deg):.2f}° {north} {abs(longitude_deg):.2f}° {east}"

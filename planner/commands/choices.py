@@ -22,6 +22,41 @@ def chosen(option: str, value: str, allowed: tuple[Word, ...]) -> Word:
     raise InputError(f"{option} {value} came; allowed: {', '.join(allowed)}")
 
 
+def within(
+    option: str,
+    value: float | None,
+    least: float = -math.inf,
+    most: float = math.inf,
+    *,
+    open_below: bool = False,
+) -> None:
+    """Refuse a number that is outside its limits, or no finite number; None is what was not given.
+
+    Parameters
+    ----------
+    option
+        Its name, for the message.
+    value
+        What came.
+    least, most
+        Limits, which are allowed themselves.
+    open_below
+        Whether the lower limit itself is refused.
+
+    Raises
+    ------
+    InputError
+        With what is allowed.
+    """
+    if value is None or (
+        math.isfinite(value) and least <= value <= most and not (open_below and value == least)
+    ):
+        return
+    start = f"more than {least:g}" if open_below else f"{least:g} or more"
+    end = f", at most {most:g}" if most < math.inf else ""
+    raise InputError(f"{option} {value:g} came; allowed: a number, {start}{end}")
+
+
 def numbers(option: str, text: str) -> list[float]:
     """Read a list such as 60,30,8.
 

@@ -30,7 +30,9 @@ BeamOption = Annotated[
     float, typer.Option("--beam", metavar="M", help="Diameter of the beam at the target [m].")
 ]
 PulseOption = Annotated[float | None, typer.Option("--pulse-ns", help="Pulse of the maps [ns].")]
-FftOption = Annotated[int | None, typer.Option("--fft-points", help="Samples of one gate of the maps.")]
+FftOption = Annotated[
+    int | None, typer.Option("--fft-points", min=1, help="Samples of one gate of the maps.")
+]
 MapsArgument = Annotated[
     list[str],
     typer.Argument(metavar="MAP...", help="Measured maps, FILE or TARGET=FILE, in the order of time."),
@@ -77,9 +79,13 @@ def plan(
     from typing import get_args
 
     from planner.cnr_map import Order, choose_targets, plan_map
-    from planner.commands.choices import chosen
+    from planner.commands.choices import chosen, within
     from planner.commands.load import load_plan
 
+    within("--accumulation", accumulation, 0.0, open_below=True)
+    within("--heading-std", heading_std, 0.0, 180.0)
+    within("--beam", beam, 0.0, open_below=True)
+    within("--pulse-ns", pulse_ns, 0.0, open_below=True)
     places = load_plan(site).exact_places
     choice = choose_targets(places, lidar)
     names = [target] if target is not None else list(choice.names) if choice else []
@@ -126,11 +132,14 @@ def fit(
     from geometry.errors import InputError
     from planner.cnr_fit import fit_head, read_maps, site_keys
     from planner.cnr_map import map_probe
+    from planner.commands.choices import within
     from planner.commands.load import load_plan
     from planner.files.yaml_edit import write_lidar
 
     if write and site == "-":
         raise InputError("--write needs a site file to write to, not standard input")
+    within("--beam", beam, 0.0, open_below=True)
+    within("--pulse-ns", pulse_ns, 0.0, open_below=True)
     places = load_plan(site).exact_places
     probe = map_probe(places.site.lidar(lidar), pulse_ns, fft_points)
     result = fit_head(places, lidar, read_maps(maps), probe=probe, solve=_angles(solve), beam_width_m=beam)

@@ -15,10 +15,13 @@ from planner.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
     from planner.budget import Budget
     from planner.error_curve import SizesFrom
-    from planner.error_nouns import ErrorCurve
+    from planner.error_nouns import ErrorCurve, SizeError
     from planner.plan import Plan
+    from planner.scan_layout import ScanLayout
     from reconstruct.prediction import Tier
 
 SizesOption = Annotated[
@@ -77,8 +80,11 @@ def errors(
     by: Tier | None = None if tier is None else chosen("--tier", tier, TIERS)
     sizes_deg = None if sizes is None else numbers("--sizes", sizes)
     plan = load_plan(site, fidelity)
+    _require_sizes(plan, sizes_deg or (), kind)
     with shown("simulating", quiet=quiet or by != "monte-carlo") as progress:
         curves = plan.errors(tier=by, sizes_deg=sizes_deg, sizes_from=kind, progress=progress)
+    for text in _remarks(plan, curves, tier_given=by is not None):
+        remark(text, quiet=quiet)
     if json:
         say_json([_document(plan, curve, budget=budget) for curve in curves])
         return
@@ -96,6 +102,47 @@ def errors(
     )
 
 
+def _require_sizes(plan: "Plan", sizes_deg: "Sequence[float]", kind: "SizesFrom") -> None:
+    """Refuse sizes that a sector scan cannot have, in words of the option they came by."""
+    from geometry.errors import InputError
+    from planner.ray_sets import own_scan, subset_of
+
+    fits: Callable[[ScanLayout, float], object] = own_scan if kind == "own" else subset_of
+    for layout in plan.layouts:
+        for size_deg in sizes_deg if layout.spec.type == "sector" and layout.targets else ():
+            try:
+                fits(layout, size_deg)
+            except InputError as error:
+                raise InputError(
+                    f"--sizes {size_deg:g} does not fit scan '{layout.name}': {error}"
+                ) from error
+
+
+def _remarks(plan: "Plan", curves: "Sequence[ErrorCurve]", *, tier_given: bool) -> "Iterator[str]":
+    """What was passed over, and why the tier is no better."""
+    from planner.wind_climate import turbulence
+
+    told = {curve.scan for curve in curves}
+    told.update(name for pair in plan.site.pairs if pair.name in told for name in pair.scans)
+    over = [f"{layout.name} ({layout.spec.type})" for layout in plan.layouts if layout.name not in told]
+    if over:
+        yield f"Passed over: {', '.join(over)}; errors are of sector scans at a target and of pairs."
+    if curves and not tier_given and turbulence(plan.site) is None:
+        yield (
+            "Linear tier, because the site file has no wind.turbulence: give it {intensity, length_m} there for the "
+            "turbulent tier and a recommended size."
+        )
+
+
+def shown_value(size: "SizeError", name: str, how: str) -> str:
+    """A value with its standard error, where it has one."""
+    value, error = size.values[name], size.standard_errors.get(name)
+    if value is None:
+        return "–"
+    spread = "" if error is None or error != error else f"±{format(error, how.removeprefix('+'))}"
+    return format(value, how) + spread
+
+
 def _document(plan: "Plan", curve: "ErrorCurve", *, budget: bool) -> dict[str, object]:
     from planner.error_entry import error_entry
 
@@ -108,6 +155,7 @@ def _document(plan: "Plan", curve: "ErrorCurve", *, budget: bool) -> dict[str, o
 
 def _print(plan: "Plan", curve: "ErrorCurve") -> None:
     from planner.commands.table import print_table
+    from planner.error_entry import blocked_remark, scans_of
 
     columns = {
         "scan bias m/s": ("speed_bias_mps", "+.3f"),
@@ -125,10 +173,7 @@ def _print(plan: "Plan", curve: "ErrorCurve") -> None:
             str(size.rays),
             str(size.scans_per_10min),
             "–" if size.condition is None else f"{size.condition:.1f}",
-            *(
-                "–" if (value := size.values[name]) is None else format(value, how)
-                for name, how in columns.values()
-            ),
+            *(shown_value(size, name, how) for name, how in columns.values()),
         )
         for size in curve.sizes
     ]
@@ -136,13 +181,13 @@ def _print(plan: "Plan", curve: "ErrorCurve") -> None:
     print_table(title, ("sector °", "rays", "scans/10 min", "condition", *columns), rows)
     advice = plan.recommendation(curve)
     if advice.sector_deg is not None:
-        say(
-            f"Recommended: {advice.reason}."
-            + (f"\nInstead of more scans: {advice.saving}." if advice.saving else "")
-            + "\n"
-        )
+        say(f"Recommended: {advice.reason}.")
+        if advice.saving:
+            say(f"Instead of more scans: {advice.saving}.")
     elif curve.lidar:
-        say(f"No recommendation: {advice.reason}.\n")
+        say(f"No recommendation: {advice.reason}.")
+    blocked = blocked_remark(plan, scans_of(plan, curve))
+    say(f"Mind: {blocked}.\n" if blocked else "")
 
 
 def _print_budget(budget: "Budget") -> None:

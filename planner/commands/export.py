@@ -28,8 +28,6 @@ DeclinationOption = Annotated[
     typer.Option(
         "--declination",
         metavar="DEG",
-        min=-180,
-        max=180,
         help="Magnetic declination at the site, east positive: adds magnetic bearings to the field sheet.",
     ),
 ]
@@ -49,14 +47,17 @@ def export(
     quiet: QuietOption = False,
 ) -> None:
     """Everything planned as GIS layers, tables, files for the instruments, and a field sheet per lidar."""
-    from planner.commands.choices import chosen
+    from planner.commands.choices import chosen, within
     from planner.commands.load import load_plan
     from planner.handover.export import KINDS, Choice, default_kinds
     from planner.handover.export import export as export_files
+    from planner.output import require_folder
 
+    within("--declination", declination, -180.0, 180.0)
     wanted = (
         None if kinds is None else tuple(chosen("--as", kind.strip(), KINDS) for kind in kinds.split(","))
     )
+    require_folder(out)
     plan = load_plan(site)
     choice = default_kinds(plan) if wanted is None else Choice(wanted, ())
     files = export_files(

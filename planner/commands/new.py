@@ -51,8 +51,13 @@ def new(
 
     The file is DIR/site.yaml; one that exists is never touched.
     """
+    from geometry.errors import InputError
     from planner.output import new_text
 
+    if folder.suffix.lower() in (".yaml", ".yml") and not folder.is_dir():
+        raise InputError(
+            f"{folder} came; DIR is wanted, a folder in which site.yaml is made: give {folder.parent}"
+        )
     path = folder / "site.yaml"
     text, notes = (
         _template(crs, layout_crs, name) if layout is None else _of_layout(layout, crs, layout_crs, name)

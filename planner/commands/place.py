@@ -38,7 +38,13 @@ TierOption = Annotated[
 ]
 CountOption = Annotated[
     int | None,
-    typer.Option("--count", metavar="N", help="Lidars to place, 1 to 4. [default: what the site suggests]"),
+    typer.Option(
+        "--count",
+        metavar="N",
+        min=1,
+        max=4,
+        help="Lidars to place, 1 to 4. [default: what the site suggests]",
+    ),
 ]
 LidarOption = Annotated[
     list[str] | None,
@@ -130,11 +136,11 @@ def place(
     """Where to put lidars: ranked places, what binds them, and maps of every criterion."""
     from dataclasses import replace
 
-    from planner.commands.choices import chosen
+    from planner.commands.choices import chosen, within
     from planner.commands.progress import shown
     from planner.figures.placement_map import criteria_maps, error_map
     from planner.files.yaml_site import load_site
-    from planner.output import output_folder
+    from planner.output import output_folder, require_folder
     from planner.placement.fan_out import How
     from planner.placement.maps import default_grid
     from planner.placement.ranking import place as ranked_places
@@ -142,6 +148,10 @@ def place(
     from planner.placement.task import on_terrain, task_of
     from planner.placement.write import rows_of, turbulent_lines, write_all
 
+    within("--reach", reach, 0.0, open_below=True)
+    within("--head-height", head_height, 0.0)
+    within("--near-cost", near_cost, 0.0)
+    require_folder(out)
     read = load_site(site)
     task = task_of(
         read, fixed=None if lidar is None else tuple(lidar), count=count, targets=tuple(target or ())
@@ -192,6 +202,12 @@ def _limits(
     min_opening: float | None,
     max_lost: float | None,
 ) -> "Limits":
+    from planner.commands.choices import within
+
+    within("--max-range", max_range, 0.0, open_below=True)
+    within("--max-elevation", max_elevation, 0.0, 90.0, open_below=True)
+    within("--min-opening", min_opening, 0.0, 90.0)
+    within("--max-lost", max_lost, 0.0, 1.0)
     given = {
         "most_range_m": max_range,
         "most_elevation_deg": max_elevation,

@@ -36,8 +36,8 @@ def point(site: SiteArgument, json: JsonOption = False, quiet: QuietOption = Fal
         for row in plan.pointings
     ]
     columns = (
-        *("lidar", "target", "azimuth true °", "grid °", "head °", "elevation °", "head °"),
-        *("range m", "gate", "gate m", "convergence °"),
+        *("lidar", "target", "azimuth true °", "grid °", "azimuth head °", "elevation °"),
+        *("elevation head °", "range m", "gate", "gate m", "convergence °"),
     )
     print_table(plan.site.name, columns, rows)
     remark(

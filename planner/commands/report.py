@@ -49,13 +49,17 @@ def report(
     """Findings, map, pointing, crossings, wakes, errors and the 3-D scene in one file, report.html."""
     from geometry.errors import InputError
     from planner.commands.load import load_plan
+    from planner.output import require_folder
     from planner.report import write_report
 
     if site == site2 == "-":
         raise InputError("both sites were to come from standard input; give one of them as a file")
+    require_folder(out)
     plans = [load_plan(name, fidelity) for name in (site, site2) if name is not None]
     trades = [_measured(plan, quiet=quiet) for plan in plans] if tradeoff else []
-    files = write_report(plans, out, trades=trades, progress=lambda text: remark(text, quiet=quiet))
+    files = write_report(
+        plans, out, trades=trades, aside=True, progress=lambda text: remark(text, quiet=quiet)
+    )
     if json:
         say_json({"report": str(files[0]), "tables": [str(path) for path in files[1:]]})
     else:

@@ -17,7 +17,9 @@ from planner.commands.options import (
 
 OutFolder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the campaign.")]
 DaysOption = Annotated[float, typer.Option("--days", metavar="D", help="Length of the campaign in days.")]
-SeedOption = Annotated[int, typer.Option("--seed", help="The same seed gives the same campaign.")]
+SeedOption = Annotated[
+    int, typer.Option("--seed", metavar="N", min=0, help="The same seed gives the same campaign.")
+]
 FormatOption = Annotated[
     str,
     typer.Option(
@@ -59,9 +61,10 @@ def simulate(
 ) -> None:
     """A virtual campaign of the site's scans through the turbulence of its wind climate."""
     from geometry.errors import InputError
-    from planner.commands.choices import chosen
+    from planner.commands.choices import chosen, within
     from planner.commands.load import load_plan
     from planner.commands.progress import shown
+    from planner.output import require_folder
     from planner.simulation import Options
     from planner.virtual_files import FORMATS, write_virtual
     from reconstruct.virtual import VirtualSettings
@@ -72,7 +75,10 @@ def simulate(
         )
     if not 0 <= lost < 1:
         raise InputError(f"--lost {lost:g} came; allowed: a share from 0 to below 1")
+    within("--days", days, 0.0, open_below=True)
+    within("--cell-m", cell_m, 0.0, open_below=True)
     form = chosen("--format", kind, FORMATS)
+    require_folder(out)
     plan = load_plan(site, fidelity)
     options = Options(days=days, seed=seed, lost_share=lost, settings=VirtualSettings(spacing_m=cell_m))
     text = Path(site).read_text(encoding="utf-8-sig")

@@ -43,9 +43,12 @@ def tour(
     quiet: QuietOption = False,
 ) -> None:
     """Fastest order of a step-stare tour through all targets, and its timing table [ms]."""
+    from planner.commands.choices import within
     from planner.commands.load import load_plan
     from planner.site_tour import site_tour
 
+    within("--cover", cover, 0.0, open_below=True)
+    within("--accumulation", accumulation, 0.0)
     plan = load_plan(site)
     found = site_tour(
         plan.exact_places,

@@ -14,7 +14,7 @@ from planner.commands.options import (
     say_json,
 )
 
-SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Start of the random numbers.")]
+SeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Start of the random numbers.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -36,8 +36,9 @@ def tradeoff(
     from planner.commands.progress import shown
     from planner.commands.table import print_table
     from planner.figures.tradeoff import tradeoff_figure
-    from planner.output import write_bytes
+    from planner.output import require_folder, write_bytes
 
+    require_folder(out)
     plan = load_plan(site)
     with shown("measuring", quiet=quiet) as progress:
         rows = plan.trades(rng=np.random.default_rng(seed), progress=progress)

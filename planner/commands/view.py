@@ -46,13 +46,16 @@ def view(
     quiet: QuietOption = False,
 ) -> None:
     """3-D scene: self-contained HTML, PNG, glTF, or a window."""
-    from planner.commands.choices import chosen
+    from planner.commands.choices import chosen, within
     from planner.commands.load import load_plan
-    from planner.output import output_folder
+    from planner.output import output_folder, require_folder
     from planner.plan_scene import plan_scene
     from planner.scene.export import left_out_png, write
 
     kinds = None if kind is None else [chosen("--as", word.strip(), KINDS) for word in kind.split(",")]
+    within("--exaggeration", exaggeration, 0.0, open_below=True)
+    if not window:
+        require_folder(out)
     scene = plan_scene(load_plan(site, fidelity)).exaggerated(exaggeration)
     if window:
         from planner.scene.pyvista_adapter import show

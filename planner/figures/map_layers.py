@@ -27,6 +27,7 @@ from planner.palette import (
 )
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
+from planner.scan_plans import PointsScan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,10 +67,14 @@ def scans(plan: Plan, axes: "Axes") -> Iterator[Layer]:
     """Every scan: its rays up to the measured gate, the gate's probe or arc, what is lost behind solids."""
     stares: dict[str, Any] = {}
     for layout in plan.layouts:
-        layer = _stare(plan, axes, layout) if layout.scan.count == 1 else _fan(plan, axes, layout)
-        if layout.scan.count > 1:
-            yield layer
+        if isinstance(layout.spec, PointsScan) or layout.scan.count > 1:
+            yield (
+                _points(plan, axes, layout)
+                if isinstance(layout.spec, PointsScan)
+                else _fan(plan, axes, layout)
+            )
             continue
+        layer = _stare(plan, axes, layout)
         lidar = layout.lidar.name
         stares.setdefault(lidar, (layer.legend[0][0], []))[1].append(
             layout.targets[0] if layout.targets else layout.name
@@ -146,14 +151,35 @@ def _lost(axes: "Axes", head: FloatArray, ends: FloatArray, share: FloatArray) -
 
 
 def _stare(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
-    """One ray, and the probe of its measured gate as a thick piece of it."""
-    colour, reach_m, half_m = lidar_colour(layout.lidar_index), _reach_m(layout), layout.probe.length_m / 2
+    """One ray, and the probe of its measured gate."""
+    return _ray(plan, axes, layout, 0, _reach_m(layout), 1.8)
+
+
+def _points(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
+    """A ray to each of the scan's targets with its gate: nothing is measured between them."""
+    rays = [
+        _ray(plan, axes, layout, ray, layout.measured_range_m(float(range_m)), 0.9)
+        for ray, range_m in enumerate(layout.aim.range_m)
+    ]
+    text = f"points “{shown(layout.name)}” of {shown(layout.lidar.name)}; thick: the gate at each"
+    lost = [entry for ray in rays for entry in ray.legend[1:]]
+    return Layer(
+        [corner for ray in rays for corner in ray.corners],
+        [],
+        [line for ray in rays for line in ray.busy],
+        [(rays[0].legend[0][0], text), *lost],
+    )
+
+
+def _ray(plan: Plan, axes: "Axes", layout: ScanLayout, ray: int, reach_m: float, linewidth: float) -> Layer:
+    """One ray of a scan, and the probe of its measured gate as a thick piece of it."""
+    colour, half_m = lidar_colour(layout.lidar_index), layout.probe.length_m / 2
     ranges_m = np.array([0.0, reach_m - half_m, reach_m + half_m, reach_m])
-    azimuth_deg, elevation_deg = layout.scan.azimuth_deg[0], layout.scan.elevation_deg[0]
+    azimuth_deg, elevation_deg = layout.scan.azimuth_deg[ray], layout.scan.elevation_deg[ray]
     points = plan.places.beam_local_m(layout.lidar, azimuth_deg, elevation_deg, ranges_m)[:, :2]
-    lost = _lost_ranges_m(plan, layout)[0]
+    lost = _lost_ranges_m(plan, layout)[ray]
     stop = points[0] + (points[3] - points[0]) * min(lost / reach_m, 1.0)
-    (line,) = axes.plot(*np.stack([points[0], stop]).T, color=colour, linewidth=1.8, zorder=4)
+    (line,) = axes.plot(*np.stack([points[0], stop]).T, color=colour, linewidth=linewidth, zorder=4)
     axes.plot(*points[1:3].T, color=colour, linewidth=6, alpha=0.6, solid_capstyle="butt", zorder=5)
     legend = [(line, layout.name), *_lost(axes, points[0], points[3:], np.array([lost / reach_m]))]
     return Layer([points], [], [along(points[0], points[3])], legend)

@@ -69,6 +69,28 @@ def load_terrain(
     return HeightRaster.from_transform(heights, tuple(transform)[:6], height_datum)
 
 
+def fault_of_raster(file: Path) -> str:
+    """Say why a file is no height raster; empty where it is one, or where rasterio is not installed.
+
+    Parameters
+    ----------
+    file
+        Only its head is read.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("rasterio") is None:
+        return ""
+    import rasterio
+    from rasterio.errors import RasterioError
+
+    try:
+        with rasterio.open(file) as raster:
+            return "" if raster.crs is not None else "It does not say in which CRS it is."
+    except RasterioError as error:
+        return f"It cannot be read as a raster: {error}."
+
+
 def write_geotiff(
     path: Path, layers: Mapping[str, FloatArray], east_m: FloatArray, north_m: FloatArray, crs: str
 ) -> None:
@@ -116,7 +138,7 @@ def _rasterio(what: str) -> ModuleType:
         import rasterio
     except ImportError:
         raise UnavailableError(
-            f"{what} needs rasterio, which is not installed: pip install 'lidarplan[terrain]'"
+            f"{what} needs rasterio, which is not installed: pip install '.[terrain]'"
         ) from None
     module: ModuleType = rasterio
     return module

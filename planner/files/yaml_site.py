@@ -66,7 +66,7 @@ def parse_site(text: str, *, name: str = "site", folder: Path | None = None) -> 
         )
     raw = tree.value if isinstance(tree.value, dict) else {}
     site, faults = _validated(raw) if raw else (None, [])
-    faults += _missing_files(raw, folder) if folder is not None else []
+    faults += [*_missing_files(raw, folder), *_no_rasters(raw, folder)] if folder is not None else []
     found = tree.faults + [YamlFault(tree.line(fault.loc), fault) for fault in faults]
     if found or site is None:
         raise InputError(_report(name, found))
@@ -150,6 +150,16 @@ def _named_files(raw: Mapping[str, object]) -> Iterator[tuple[Loc, str]]:
 def _missing_files(raw: Mapping[str, object], folder: Path) -> list[Fault]:
     missing = [(loc, name) for loc, name in _named_files(raw) if not (folder / name).is_file()]
     return [Fault(loc, name, f"a file that exists (looked for {folder / name})") for loc, name in missing]
+
+
+def _no_rasters(raw: Mapping[str, object], folder: Path) -> Iterator[Fault]:
+    """Files of a terrain that are there but no rasters."""
+    for loc, name in _named_files(raw):
+        if loc[0] == "terrain" and (folder / name).is_file():
+            from planner.files.raster import fault_of_raster
+
+            if why := fault_of_raster(folder / name):
+                yield Fault(loc, name, "a raster of heights with its CRS, such as a GeoTIFF", why)
 
 
 def _rooted(site: Site, folder: Path) -> Site:

@@ -150,7 +150,7 @@ def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> 
         from distributed import Client, as_completed
     except ImportError:
         raise UnavailableError(
-            "--scheduler needs dask, which is not installed: pip install 'lidarplan[cluster]'"
+            "--scheduler needs dask, which is not installed: pip install '.[cluster]'"
         ) from None
     try:
         client = Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]

@@ -76,6 +76,6 @@ def _trimesh() -> Any:
     if importlib.util.find_spec("trimesh") is None:
         raise UnavailableError(
             "no glTF: the package trimesh is not installed. Install the extra with pip install "
-            "'lidarplan[gltf]'; the picture and the HTML page need no extra"
+            "'.[gltf]'; the picture and the HTML page need no extra"
         )
     return importlib.import_module("trimesh")

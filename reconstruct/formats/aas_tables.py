@@ -60,7 +60,7 @@ def connected(place: str | Path, *, write: bool = False) -> "Iterator[sa.Connect
         import sqlalchemy as sa
     except ImportError as error:
         raise UnavailableError(
-            "databases need the extra 'db' (SQLAlchemy, PyMySQL): pip install 'lidarplan[db]'"
+            "databases need the extra 'db' (SQLAlchemy, PyMySQL): pip install '.[db]'"
         ) from error
     url = sa.make_url(database_url(place))
     shown = url.render_as_string(hide_password=True)
@@ -69,9 +69,7 @@ def connected(place: str | Path, *, write: bool = False) -> "Iterator[sa.Connect
     try:
         engine = sa.create_engine(url)
     except ModuleNotFoundError as error:
-        raise UnavailableError(
-            f"{shown} needs the driver {error.name!r}: pip install 'lidarplan[db]'"
-        ) from error
+        raise UnavailableError(f"{shown} needs the driver {error.name!r}: pip install '.[db]'") from error
     try:
         with engine.begin() as connection:
             yield connection

@@ -43,7 +43,7 @@ def write_netcdf(records: Records, path: Path) -> None:
         import xarray as xr
     except ImportError as error:
         raise UnavailableError(
-            "netCDF files need the extra 'data' (xarray, netCDF4): pip install 'lidarplan[data]'"
+            "netCDF files need the extra 'data' (xarray, netCDF4): pip install '.[data]'"
         ) from error
     start = (
         records.time_utc[0].astype("datetime64[s]") if records.rays else np.datetime64("1970-01-01T00:00:00")

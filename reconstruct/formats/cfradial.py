@@ -87,7 +87,7 @@ def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
         import xarray as xr
     except ImportError as error:
         raise UnavailableError(
-            "netCDF files need the extra 'data' (xarray, netCDF4): pip install 'lidarplan[data]'"
+            "netCDF files need the extra 'data' (xarray, netCDF4): pip install '.[data]'"
         ) from error
     read_bytes(path)
     try:

@@ -70,6 +70,18 @@ def aimed(azimuth_deg: float = 0.0, elevation_deg: float = 0.0) -> Changes:
     return {"scans": [{**stare, **head}, {**stare, "name": "b", "lidar": "B"}]}
 
 
+def aimed_sector(azimuth_deg: float, elevation_deg: float = 0.0) -> Changes:
+    """A sector of 60° around an axis turned away from the target."""
+    return sector(azimuth_head_deg=azimuth_deg, elevation_head_deg=ELEVATION_DEG + elevation_deg)
+
+
+def ground_stare(elevation_deg: float) -> Changes:
+    """A head 20 m above the ground, a gate at 979 m: with half a probe it wants to see 1000 m."""
+    lidar = {**LIDAR_A, "position": [500000, 6250000, 30]}
+    head = {"azimuth_head_deg": 0, "elevation_head_deg": elevation_deg, "target": None}
+    return {"lidars": [lidar], **scan(**head, gates={"first_m": 979, "spacing_m": 10, "count": 1})}
+
+
 def mast(east_m: float) -> Changes:
     """A mast half way to the target, 1 m wide, beside the beam."""
     return {
@@ -161,6 +173,9 @@ CASES = (
         {"wind": {"vertical_mps": -0.51}},
     ),
     Case("aim", "warning", aimed(elevation_deg=0.09), aimed(elevation_deg=0.11)),
+    Case("aim", "error", aimed(azimuth_deg=2.3), aimed(azimuth_deg=2.6)),  # the probe, 42.6 m, is 2.43°
+    Case("aim", "error", aimed_sector(29.9), aimed_sector(30.1)),
+    Case("aim", "error", aimed_sector(0.0, 2.3), aimed_sector(20.0, 2.6)),
     Case("opening-angle", "warning", opening(30.1), opening(29.9)),
     Case("opening-angle", "warning", opening(149.9), opening(150.1)),
     Case("crossing-gap", "warning", aimed(elevation_deg=0.02), aimed(elevation_deg=0.05)),  # 17.5 m a degree
@@ -194,6 +209,9 @@ CASES = (
     Case("central-meridian", "warning", at_longitude(18.49, "EPSG:3006"), at_longitude(18.51, "EPSG:3006")),
     Case("same-place", "warning", second_lidar(1.01), second_lidar(0.99)),
     Case("same-place", "warning", second_target(1.01), second_target(0.99)),
+    Case("head-height", "warning", {"ground_height_m": 11.9}, {"ground_height_m": 12.1}),
+    Case("terrain-partial", "info", {}, {"terrain": {"file": "hills.tif"}, "ground_height_m": None}),
+    Case("beam-blocked", "error", ground_stare(-1.1), ground_stare(-1.2)),  # 20 m over 1 km is 1.15°
     Case("target-height", "error", {"ground_height_m": 109.9}, {"ground_height_m": 110.0}),
     Case("head-unknown", "info", instrument(), instrument(head=None)),
     Case("limits-unknown", "info", instrument(), instrument(max_range_m=None)),
@@ -227,7 +245,7 @@ def test_a_limit_is_seen_from_both_sides(moor: Moor, case: Case) -> None:
     assert finding.subject
     assert finding.unit
     assert finding.value is not None or finding.code in ("head-unknown", "pulse-unknown")
-    assert (finding.limit is not None) or finding.code in ("head-unknown", "pulse-unknown")
+    assert (finding.limit is not None) or finding.code in ("head-unknown", "pulse-unknown", "terrain-partial")
     assert len(finding.text) > 60  # value, limit and what to do, in words
     assert "nan" not in finding.text.lower().split()
     assert re.search(r"\d\.\d{4}", finding.text) is None  # no number with more digits than it deserves
@@ -417,3 +435,52 @@ def test_any_scan_is_checked_without_a_nan(moor: Moor, fields: Changes, device: 
     pairs = [{"name": "dual", "scans": ["a", "b"], "target": "up", "synchronised": True}]
     plan = moor(lidars=lidars, targets=targets, scans=scans, pairs=pairs, turbines=[stand])
     json.dumps([finding._asdict() for finding in findings(plan)], allow_nan=False)
+
+
+def test_an_rhi_tells_the_elevations_that_it_loses(moor: Moor) -> None:
+    """A mast 90 m high at 500 m hides what is below 10.2°: the rays from 0° to 10°; its azimuth is one."""
+    fields = {"type": "rhi", "elevation_from_deg": 0, "elevation_to_deg": 20, "step_deg": 2}
+    stand = {"masts": [{"name": "M", "position": [500000, 6250500, 10], "height_m": 90}]}
+    (finding,) = found(moor, scan(**fields) | stand, "beam-blocked")
+    assert "numbers 1-6, elevation 1.0 to 11.0°" in finding.text
+    assert "azimuth" not in finding.text
+
+
+def test_rays_of_an_rhi_that_go_into_the_ground_are_told(moor: Moor) -> None:
+    """From 10 m above the ground, rays steeper than 0.57° downwards do not reach 1 km."""
+    fields = {"type": "rhi", "elevation_from_deg": -4, "elevation_to_deg": 4, "step_deg": 2}
+    (finding,) = found(moor, scan(**fields) | {"ground_height_m": 0}, "beam-blocked")
+    assert finding.severity == "warning"
+    assert "2 of 4 rays (numbers 1-2, elevation -3.0 to -1.0°) are lost to the ground, 143 m" in finding.text
+
+
+def test_hovsores_head_just_below_the_declared_ground_is_no_finding(hovsore: Plan) -> None:
+    """WS_K stands 0.75 m below the 4.8 m that are declared for the ground."""
+    assert not [each for each in findings(hovsore) if each.code == "head-height" or "ground" in each.text]
+
+
+def test_a_pulse_that_nobody_names_is_told_once_for_an_instrument(moor: Moor) -> None:
+    (finding,) = found(moor, instrument(pulses=[]), "pulse-unknown")
+    assert (finding.subject, finding.value) == ("test lidar", 200.0)
+    assert "200 ns are taken" in finding.text
+    assert "neither the scan (a, b) nor test lidar names one" in finding.text
+
+
+def test_only_a_zone_of_transverse_mercator_has_neighbours(moor: Moor) -> None:
+    """EPSG:2154 is a cone with its meridian at 3° east."""
+    (zone,) = found(moor, at_longitude(18.51, "EPSG:3006"), "central-meridian")
+    (cone,) = found(moor, at_longitude(7.0, "EPSG:2154", 45.0), "central-meridian")
+    assert "neighbouring zone" in zone.text
+    assert "neighbouring" not in cone.text
+    assert "local UTM zone" in cone.text
+
+
+def test_check_says_first_where_the_site_is(capsys: pytest.CaptureFixture[str]) -> None:
+    """Høvsøre lies at 56.4° north and 8.2° east; `--quiet` keeps it to itself."""
+    from planner.commands.check import check
+
+    site = str(ROOT / "examples" / "hovsore" / "site.yaml")
+    check(site)
+    assert re.match(r"site at 56\.4\d° N 8\.1\d° E\n", capsys.readouterr().err)
+    check(site, quiet=True)
+    assert capsys.readouterr().err == ""

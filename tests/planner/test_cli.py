@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import tomllib
 from importlib import import_module
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from planner import cli
 from planner.files.yaml_site import load_site
 
 ROOT = Path(__file__).resolve().parents[2]
+HOVSORE = str(ROOT / "examples" / "hovsore" / "site.yaml")
+KASSEL = str(ROOT / "examples" / "kassel" / "site.yaml")
 PROGRAM = "import sys; from planner.cli import main; main()"
 
 
@@ -139,3 +142,96 @@ def test_a_reader_that_goes_away_is_no_error_worth_a_word() -> None:
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == cli.PIPE_CLOSED
+
+
+@pytest.mark.parametrize("arguments", [("check", KASSEL), ("point", HOVSORE, "--json")])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_full_disk_is_told_in_one_line(arguments: tuple[str, ...]) -> None:
+    """Exit code 2, no traceback, and nothing from the interpreter on its way out."""
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        command = [sys.executable, "-c", PROGRAM, *arguments, "--quiet"]
+        done = subprocess.run(
+            command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, encoding="utf-8", check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr.startswith("lidarplan: the output cannot be written")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_closed_output_is_told_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    code = cli.run(["--version"])
+    monkeypatch.undo()
+    assert code == 2
+    assert capsys.readouterr().err.startswith("lidarplan: standard output is closed")
+
+
+def test_version_is_the_project_s(capsys: pytest.CaptureFixture[str]) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out == f"lidarplan {project['version']}\n"
+
+
+def test_new_wants_a_folder_not_the_name_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.run(["new", str(tmp_path / "own" / "site.yaml")]) == 2
+    assert f"DIR is wanted, a folder in which site.yaml is made: give {tmp_path / 'own'}" in (
+        capsys.readouterr().err
+    )
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["report", "view", "export", "tradeoff", "simulate", "place"])
+def test_a_folder_that_cannot_be_made_is_refused_before_the_site_is_read(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The site file has faults, and they are not what is told; nothing is left behind."""
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    site = tmp_path / "site.yaml"
+    site.write_text("name: Moor\n", encoding="utf-8")
+    assert cli.run([command, str(site), "--out", str(tmp_path / "file" / "x")]) == 2
+    told = capsys.readouterr().err
+    assert "is a file, not a folder" in told
+    assert {path.name for path in tmp_path.iterdir()} == {"file", "site.yaml"}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("tradeoff", HOVSORE, "--seed", "-1"),
+        ("simulate", HOVSORE, "--seed", "-1"),
+        ("simulate", HOVSORE, "--days", "nan"),
+        ("simulate", HOVSORE, "--days", "0"),
+        ("simulate", HOVSORE, "--cell-m", "-1"),
+        ("place", HOVSORE, "--count", "0"),
+        ("place", HOVSORE, "--reach", "-1"),
+        ("place", HOVSORE, "--max-range", "0"),
+        ("place", HOVSORE, "--max-elevation", "91"),
+        ("place", HOVSORE, "--min-opening", "-1"),
+        ("place", HOVSORE, "--max-lost", "2"),
+        ("place", HOVSORE, "--head-height", "-1"),
+        ("place", HOVSORE, "--near-cost", "inf"),
+        ("tour", HOVSORE, "--cover", "0"),
+        ("tour", HOVSORE, "--accumulation", "-1"),
+        ("cnr-map", "plan", HOVSORE, "--lidar", "WS_W", "--accumulation", "0"),
+        ("cnr-map", "plan", HOVSORE, "--lidar", "WS_W", "--heading-std", "181"),
+        ("cnr-map", "plan", HOVSORE, "--lidar", "WS_W", "--beam", "0"),
+        ("cnr-map", "plan", HOVSORE, "--lidar", "WS_W", "--pulse-ns", "-1"),
+        ("cnr-map", "plan", HOVSORE, "--lidar", "WS_W", "--fft-points", "0"),
+        ("export", HOVSORE, "--declination", "nan"),
+        ("view", HOVSORE, "--exaggeration", "0"),
+    ],
+)
+def test_a_number_out_of_range_is_told_with_its_option(
+    arguments: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(list(arguments)) == 2
+    assert arguments[-2] in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -9,6 +9,9 @@ from typing import Any
 import pytest
 
 from planner.cli import run
+from planner.commands.errors import shown_value
+from planner.commands.table import print_table
+from planner.error_nouns import SizeError
 
 ROOT = Path(__file__).resolve().parents[2]
 HOVSORE = str(ROOT / "examples" / "hovsore" / "site.yaml")
@@ -128,3 +131,71 @@ def test_a_site_without_scans_says_so(capsys: pytest.CaptureFixture[str], tmp_pa
     assert document(capsys, "check", str(site)) == []
     assert run(["point", str(site)]) == 2
     assert "0 targets" in capsys.readouterr().err
+
+
+def test_tables_cut_nothing_where_the_terminal_is_narrow(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """80 columns: every number of `point` in full, each heading once, and no line ends in blanks."""
+    rows = document(capsys, "point", HOVSORE)
+    monkeypatch.setenv("COLUMNS", "80")
+    text = printed(capsys, "point", HOVSORE)
+    assert "…" not in text
+    for row in rows:
+        assert f"{row['azimuth_true_deg']:.3f}" in text
+        assert f"{row['convergence_deg']:+.3f}" in text
+    assert (text.count("azimuth head °"), text.count("elevation head °")) == (1, 1)
+    assert all(line == line.rstrip() for line in text.splitlines())
+
+
+def test_only_the_folding_column_folds_and_to_no_less_than_forty(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finding = "word " * 60
+    for columns, longest in (("120", range(110, 121)), ("30", range(55, 75))):
+        monkeypatch.setenv("COLUMNS", columns)
+        print_table("", ("name", "finding"), [("n" * 25, finding)], fold="finding")
+        text = capsys.readouterr().out
+        assert text.count("n" * 25) == 1
+        assert text.count("word") == 60
+        assert max(map(len, text.splitlines())) in longest
+
+
+def test_errors_says_what_it_passes_over_and_what_cures_the_linear_tier(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    lidar = "{name: A, position: [500000, 6250000, 10], instrument: windscanner-200s}"
+    target = "{name: T, position: [500000, 6251000, 110]}"
+    scans = (
+        "  - {name: s, lidar: A, target: T, type: sector, sector_deg: 60, step_deg: 2, accumulation_s: 0.4}\n"
+        "  - {name: lone, lidar: A, target: T, type: stare, accumulation_s: 0.5}\n"
+    )
+    site = tmp_path / "site.yaml"
+    text = f"name: Moor\ncrs: EPSG:32632\nlidars: [{lidar}]\ntargets: [{target}]\nscans:\n{scans}"
+    site.write_text(text, encoding="utf-8")
+    assert run(["errors", str(site), "--sizes", "60"]) == 0
+    told = capsys.readouterr()
+    assert "Passed over: lone (stare)" in told.err
+    assert "no wind.turbulence" in told.err
+    assert run(["errors", str(site), "--sizes", "60", "--tier", "noise", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("kind", ["own", "subset"])
+def test_a_size_that_does_not_fit_is_told_with_its_option(
+    capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    assert run(["errors", HOVSORE, "--sizes", "60,61", "--sizes-from", kind]) == 2
+    assert "--sizes 61 does not fit scan 'sector'" in capsys.readouterr().err
+
+
+def test_errors_drawn_by_chance_stand_with_their_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+    size = SizeError(
+        sector_deg=60, rays=31, scans_per_10min=20, period_s=30, range_m=1000, condition=4,
+        values={"slope": 1.0012, "bias": -0.12, "unknown": None}, standard_errors={"slope": 0.0021},
+    )  # fmt: skip
+    assert shown_value(size, "slope", ".4f") == "1.0012±0.0021"
+    assert shown_value(size, "bias", "+.3f") == "-0.120"
+    assert shown_value(size, "unknown", "+.3f") == "–"
+    print_table("", ("slope of the regression",), [("1.0012±0.0021",)])
+    assert f"\n {'1.0012±0.0021':>23}\n" in capsys.readouterr().out

@@ -102,18 +102,30 @@ def test_gap_and_miss_agree_with_earth_centred_coordinates(moor: Moor) -> None:
     assert met.gap_m == pytest.approx(apart.min(), abs=0.01)
 
 
+def lidars_at(*east_m: float) -> list[dict[str, Any]]:
+    """Lidars A, B, ... 1 km south of the target, so far to the east."""
+    return [
+        {"name": name, "position": [500000 + east, 6250000, 10], "instrument": "windscanner-200s"}
+        for name, east in zip("ABC", east_m, strict=False)
+    ]
+
+
 def test_three_scans_make_three_pairs_of_beams(moor: Moor) -> None:
-    stare: dict[str, Any] = {"lidar": "A", "target": "T", "type": "stare", "accumulation_s": 0.5}
-    scans = [{**stare, "name": name} for name in "abc"]
-    met = moor(scans=scans, pairs=[{"name": "three", "scans": list("abc"), "target": "T"}]).crossings
+    stare: dict[str, Any] = {"target": "T", "type": "stare", "accumulation_s": 0.5}
+    scans = [{**stare, "name": name, "lidar": name.upper()} for name in "abc"]
+    met = moor(
+        lidars=lidars_at(0, 500, 1000),
+        scans=scans,
+        pairs=[{"name": "three", "scans": list("abc"), "target": "T"}],
+    ).crossings
     assert [(item.scan1, item.scan2) for item in met] == [("a", "b"), ("a", "c"), ("b", "c")]
 
 
 def test_beams_in_one_line_have_no_point_but_a_distance(moor: Moor) -> None:
-    """Two scans of one lidar at one target: parallel, gap 0, nowhere."""
-    stare: dict[str, Any] = {"lidar": "A", "target": "T", "type": "stare", "accumulation_s": 0.5}
-    scans = [{**stare, "name": name} for name in "ab"]
-    (met,) = moor(scans=scans).crossings
+    """Two lidars in one place and one target: parallel, gap 0, nowhere."""
+    stare: dict[str, Any] = {"target": "T", "type": "stare", "accumulation_s": 0.5}
+    scans = [{**stare, "name": name, "lidar": name.upper()} for name in "ab"]
+    (met,) = moor(lidars=lidars_at(0, 0), scans=scans).crossings
     assert (met.angle_deg, met.gap_m) == pytest.approx((0.0, 0.0), abs=1e-6)
     assert math.isnan(met.range1_m)
 

@@ -1,6 +1,7 @@
 """The figures: they draw any name as it stands, keep names apart, and leave out what nothing is known of."""
 
 from io import BytesIO
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,13 +11,16 @@ from PIL import Image
 
 from planner.figures.canvas import canvas
 from planner.figures.map_layers import most_lost
+from planner.figures.map_layers import scans as scan_layers
 from planner.figures.names import Name, draw_names, shown
 from planner.figures.sector_error import Published, TierCurve, sector_error
 from planner.figures.site_map import site_map
+from planner.figures.tradeoff import tradeoff_figure
 from planner.figures.wake_rose import rings, wake_rose
 from planner.palette import EXCLUDED, rgb
 from planner.plan import Plan
 from planner.site import Site
+from planner.tradeoff import Trade
 
 EVIL = r"$\frac{$ <b>&amp;</b> 風 _x"
 
@@ -170,3 +174,38 @@ def test_published_slopes_are_marked_beside_the_predicted() -> None:
     measured = Published("published", np.array([60.0, 30.0]), np.array([0.998, 0.986]))
     with_marks, without = (pixels(sector_error(predicted, title="s", published=p)) for p in (measured, None))
     assert near(with_marks, EXCLUDED) > near(without, EXCLUDED) + 50
+
+
+def test_a_points_scan_has_its_rays_and_nothing_between_them() -> None:
+    """Its layer names the points, and no area of it is filled."""
+    site = evil_site()
+    far = {"name": "far", "position": (448900.0, 6256300.0, 90.0)}
+    scan = {"name": "tour", "lidar": site.lidars[0].name, "type": "points", "accumulation_s": 1.0}
+    more = {
+        "targets": [*site.model_dump()["targets"], far],
+        "scans": [{**scan, "targets": [site.targets[0].name, "far"]}],
+        "pairs": [],
+    }
+    plan = Plan(Site.model_validate({**site.model_dump(exclude_none=True), **more}))
+    with canvas(5, 5) as figure:
+        axes = figure.add_subplot()
+        layers = list(scan_layers(plan, axes))
+        assert not axes.patches and len(axes.lines) >= 4
+    assert next(text.split(" ")[0] for layer in layers for _, text in layer.legend) == "points"
+
+
+@pytest.mark.parametrize("times_s", [(4.0, 4.1), (1e-8, 10.0)])
+def test_times_that_are_close_or_far_apart_have_labels_that_stay_apart(times_s, monkeypatch) -> None:
+    """Every label of the axis of times ends before the next begins, and none is a bare power."""
+    seen = []
+
+    def kept(figure):
+        figure.canvas.draw()
+        boxes = [text.get_window_extent() for text in figure.axes[0].get_xticklabels() if text.get_text()]
+        seen.extend(sorted((box.x0, box.x1) for box in boxes))
+        return b""
+
+    monkeypatch.setattr("planner.figures.tradeoff.image", kept)
+    tradeoff_figure([Trade("geometry", f"way {i}", time, 0.1, "m") for i, time in enumerate(times_s)])
+    assert len(seen) >= 2
+    assert all(first[1] < second[0] for first, second in pairwise(seen))

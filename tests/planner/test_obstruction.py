@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry.arrays import FloatArray
-from planner.obstruction import margin_m, reach_m
+from planner.obstruction import ground_met_m, margin_m, reach_m
 from planner.plan import Plan
 
 Moor = Callable[..., Plan]
@@ -109,3 +109,27 @@ def test_the_margin_is_two_standard_deviations_of_the_worse_direction(moor: Moor
     lidar = {"name": "A", "position": [500000, 6250000, 10], "instrument": "windscanner-200s"}
     made = moor(lidars=[{**lidar, "uncertainty": unsure}], scans=[], pairs=[]).site.lidars[0]
     assert margin_m(made, 500.0) == pytest.approx(2 * np.hypot(0.1, 500 * np.deg2rad(0.13)))
+
+
+def test_where_a_beam_meets_the_round_earth_by_brute_force() -> None:
+    """Distance to the Earth's centre along the beam, in steps of 1 m, first below the ground's radius."""
+    radius_m, height_m = 6_371_000.0, 10.0
+    along = np.arange(0.0, 20_000.0)
+    for elevation_deg in (-3.0, -0.2, -0.102, -0.1, 0.0, 5.0):
+        turn = np.deg2rad(elevation_deg)
+        up = np.hypot(radius_m + height_m + along * np.sin(turn), along * np.cos(turn)) - radius_m
+        met = along[up < 0.0]
+        found = float(ground_met_m(height_m, elevation_deg))
+        assert found == pytest.approx(met[0] if met.size else np.inf, abs=1.5 + 0.01 * found * (found < 1e9))
+
+
+def test_a_terrain_says_itself_where_the_ground_is(moor: Moor) -> None:
+    scan = {"name": "a", "lidar": "A", "type": "stare", "accumulation_s": 0.5, "gates": None}
+    head = {"azimuth_head_deg": 0, "elevation_head_deg": -5}
+    gates = {"first_m": 500, "spacing_m": 10, "count": 1}
+    down = [{**scan, **head, "gates": gates}]
+    (met,) = moor(ground_height_m=0, scans=down, pairs=[]).obstructions
+    assert (met.part, met.lost.tolist()) == ("ground", [True])
+    assert met.range_m == pytest.approx(10 / np.sin(np.deg2rad(5)), abs=0.1)
+    hills = {"ground_height_m": None, "terrain": {"file": "hills.tif"}}
+    assert moor(**hills, scans=down, pairs=[]).obstructions == ()

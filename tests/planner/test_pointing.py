@@ -133,3 +133,14 @@ def test_straight_up_and_on_the_spot(moor: Callable[..., Plan]) -> None:
     assert (up.elevation_deg, up.range_m) == pytest.approx((90.0, 250.0))
     assert here.range_m == pytest.approx(0.0, abs=1e-6)
     assert here.refraction_deg == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_gate_is_named_only_for_a_target_inside_it(moor: Callable[..., Plan]) -> None:
+    """Gates each 50 m from 500 m on, the last at 950: the target at 1005 m is beyond half a spacing from it."""
+    target = [{"name": "T", "position": [500000, 6251000, 110]}]
+    for count, centre_m in ((10, None), (11, 1000.0)):
+        gates = {"first_m": 500, "spacing_m": 50, "count": count}
+        stare = {"name": "a", "lidar": "A", "target": "T", "type": "stare", "accumulation_s": 0.5}
+        plan = moor(targets=target, scans=[{**stare, "gates": gates}], pairs=[])
+        row = plan.pointings[0]
+        assert (row.gate_index, row.gate_centre_m) == (None if centre_m is None else 10, centre_m)

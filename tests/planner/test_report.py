@@ -5,18 +5,23 @@ import csv
 import hashlib
 import re
 from html.parser import HTMLParser
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
 
 from geometry.errors import InputError
+from planner.error_entry import error_entries
+from planner.files.yaml_site import load_site
 from planner.plan import Plan
 from planner.plan_scene import plan_scene
 from planner.report import report_html, write_report
-from planner.report_numbers import key_numbers
+from planner.report_numbers import MISSES, key_numbers
+from planner.report_site import made_line, position_table, wind_table
 from planner.report_tables import pointing_table, unknown_numbers, wake_table
 from planner.report_values import Column, csv_text
 from planner.site import Site
+from planner.templates import site_text
 
 EVIL = "</title></script><script>alert(1)</script><img src=x onerror=alert(2)> \" ' & $x$ {{7*7}} Ærø 風"
 TABLES = {"pointing.csv", "findings.csv", "wakes.csv", "crossings.csv", "errors.csv"}
@@ -293,3 +298,80 @@ def test_scans_whose_long_names_begin_alike_stay_apart_in_the_scene() -> None:
     names = [layer.name for layer in plan_scene(Plan(small(scans=alike, pairs=[]))).layers]
     assert len(names) == len(set(names))
     assert max(map(len, names)) < 70
+
+
+def test_blocked_rays_are_counted_and_said_beside_the_prediction(hovsore: Plan) -> None:
+    """13 of the sector's 30 rays pass through rotors, 2 of these meet a tower, which stands in the way in every wind."""
+    entry = next(entry for entry in error_entries(hovsore, hovsore.default_errors) if entry.get("lidar"))
+    assert entry["blocked_rays"] == 13
+    assert entry["blocked_remark"] == (
+        "13 of 30 rays are blocked, 2 of them in every wind; the prediction counts them as measured"
+    )
+    assert all(
+        entry["blocked_remark"] is None for entry in error_entries(Plan(small(obstacles=[], turbines=[])))
+    )
+
+
+def test_positions_have_the_latitude_and_longitude_of_proj() -> None:
+    """The central meridian of zone 32 is 9° east; 6256000 m north is 56.448° (Karney's series, as in PROJ)."""
+    from pyproj import Transformer
+
+    table = position_table(Plan(small()))
+    assert [row[:2] for row in table.rows] == [
+        ("lidar", "A"),
+        ("lidar", "B"),
+        ("mast", "M"),
+        ("turbine", "T"),
+        ("target", "P"),
+    ]
+    to_degrees = Transformer.from_crs("EPSG:32632", "EPSG:4326", always_xy=True)
+    for row in table.rows:
+        assert (row[6], row[5]) == pytest.approx(to_degrees.transform(row[2], row[3]), abs=1e-8)
+
+
+def test_the_wind_that_was_taken_is_said(hovsore: Plan) -> None:
+    taken = dict(wind_table(hovsore).page_rows)
+    assert taken["directions that count"] == "118–270°"
+    assert dict(wind_table(Plan(small(wind=None))).page_rows)["speeds"].startswith("10 m/s")
+
+
+def test_only_one_line_of_the_page_tells_when_it_was_made(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert any(re.search(r"Made \d{4}-\d\d-\d\d \d\d:\d\d UTC by lidarplan", text) for text in page.texts)
+    assert any("CRS EPSG:32632" in text for text in page.texts)
+
+    def absent(_: str) -> str:
+        raise PackageNotFoundError
+
+    monkeypatch.setattr("planner.report_site.version", absent)
+    assert made_line().endswith("not installed)")
+
+
+def test_a_pair_that_misses_its_target_says_by_how_far() -> None:
+    """Ten degrees off at 800 m: the beam passes about 140 m beside the target."""
+    plan = Plan(small())
+    aimed = next(row for row in plan.pointings if row.lidar == "B")
+    scans = [scan.model_dump(exclude_none=True) for scan in plan.site.scans]
+    scans[1] |= {
+        "azimuth_head_deg": aimed.azimuth_head_deg + 10.0,
+        "elevation_head_deg": aimed.elevation_head_deg,
+    }
+    off = Plan(small(scans=scans))
+    miss = aimed.range_m * 0.17365  # sine of 10 degrees
+    told = {number.label: number.text for number in key_numbers(off, [], [])}[MISSES]
+    assert float(told.split(" m")[0]) == pytest.approx(miss, rel=0.01)
+    labels = [label.text for layer in plan_scene(off).layers for label in layer.labels]
+    label = next(text for text in labels if "misses target by" in text)
+    assert float(label.split()[-2]) == pytest.approx(miss, rel=0.01)
+    assert {number.label: number.text for number in key_numbers(plan, [], [])}[MISSES].startswith("none")
+
+
+def test_every_example_in_the_template_of_a_site_is_right(tmp_path: Path) -> None:
+    """Commented-out scans, obstacles and hard targets load when their comment signs go."""
+    text = re.sub(r"^# - \{", "  - {", site_text(), flags=re.MULTILINE)
+    text = text.replace("obstacles: []", "obstacles:").replace("hard_targets: []", "hard_targets:")
+    (tmp_path / "site.yaml").write_text(text, encoding="utf-8")
+    site = load_site(tmp_path / "site.yaml")
+    assert {scan.type for scan in site.scans} == {"sector", "ppi", "rhi", "stare", "raster", "points"}
+    assert site.obstacles and len(site.hard_targets) == 2

@@ -50,7 +50,7 @@ def test_shares_add_up_to_one_in_ascending_order(tmp_path: Path) -> None:
         ("direction_deg,share\n0,0\n180,0\n", "not all 0"),
         ("direction_deg,share\n0,\n180,1\n", "have to be numbers"),
         ("direction_deg,share\n0,some\n180,1\n", "no number"),
-        ("direction_deg,share,weibull_scale_mps,weibull_shape\n0,1,0,2\n180,1,8,2\n", "above 0"),
+        ("direction_deg,share,weibull_scale_mps,weibull_shape\n0,0.5,0,2\n180,0.5,8,2\n", "above 0"),
         ("", "cannot be read"),
     ],
 )
@@ -81,7 +81,7 @@ def test_the_prevailing_direction_is_the_mean_of_the_wanted_ones(moor: Moor, tmp
     """Uniform: the middle. With a rose: by symmetry 270, and the vector sum of four sectors by hand."""
     assert prevailing_deg(moor().site, between(118, 270)) == pytest.approx(194.0, abs=0.01)
     assert prevailing_deg(moor().site, between(350, 20)) == pytest.approx(5.0, abs=0.01)
-    site = site_with(moor, rose=str(rose_file(tmp_path, "direction_deg,share\n0,1\n90,0\n180,1\n270,3\n")))
+    site = site_with(moor, rose=str(rose_file(tmp_path, "direction_deg,share\n0,20\n90,0\n180,20\n270,60\n")))
     assert prevailing_deg(site, SectorSet.full()) == pytest.approx(270.0, abs=0.01)
     site = site_with(moor, rose=str(rose_file(tmp_path, FOUR)))
     assert prevailing_deg(site, SectorSet.full()) == pytest.approx(225.0, abs=0.01)  # (-0.2, -0.2)

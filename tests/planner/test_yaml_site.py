@@ -12,9 +12,11 @@ from hypothesis.strategies import DataObject, booleans, data, sampled_from
 from ruamel.yaml import YAML
 
 from geometry.errors import InputError
+from planner.assumptions import assumptions
 from planner.files.yaml_site import load_site, parse_site
 from planner.files.yaml_tree import Tree
 from planner.site import PointsScan, SectorScan
+from planner.wind_rose import load_rose
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -406,3 +408,47 @@ def test_whatever_stands_in_a_site_it_is_read_or_refused_in_words(draw: DataObje
         assert heading.startswith("odd.yaml: ")
         assert told
         assert all(text.startswith("  odd.yaml:1: ") for text in told)
+
+
+@pytest.mark.parametrize(
+    ("pair", "told"),
+    [("[s, s]", "it is named twice"), ("[s, t]", "s is a scan of A too")],
+)
+def test_a_pair_needs_two_lidars(pair: str, told: str) -> None:
+    other = "  - {name: t, lidar: A, target: cup, type: stare, accumulation_s: 0.5}\npairs:"
+    (fault,) = faults(GOOD.replace("pairs:", other).replace("[s, k]", pair))
+    assert fault.startswith(f"  bad.yaml:20: pairs[0].scans[1]: '{pair[4]}' came")
+    assert told in fault
+
+
+def test_a_terrain_that_is_no_raster_is_told_at_its_line(tmp_path: Path) -> None:
+    pytest.importorskip("rasterio")
+    (tmp_path / "hills.tif").write_text("no raster", encoding="utf-8")
+    (tmp_path / "site.yaml").write_text(
+        GOOD.replace("ground_height_m: 5", "terrain: {file: hills.tif}"), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r":3: terrain\.file: 'hills\.tif' came; allowed: a raster"):
+        load_site(tmp_path / "site.yaml")
+
+
+def test_what_is_taken_for_pulse_head_wakes_and_rose_is_told(tmp_path: Path) -> None:
+    (tmp_path / "rose.csv").write_text("direction_deg,share\n0,40\n180,60\n", encoding="utf-8")
+    turbine = "turbines: [{name: W, position: [447700, 6255000, 5], hub_height_m: 80, rotor_diameter_m: 90}]"
+    text = GOOD.replace("weibull: {scale_mps: 8.9, shape: 2.75}", "rose: rose.csv") + turbine
+    text = text.replace("[{pulse_ns: 200, pulse_repetition_hz: 20000}]", "[]")
+    told = " ".join(assumptions(parse_site(text, folder=tmp_path)))
+    assert "no Weibull columns: all speeds from 4 to 25 m/s count alike" in told
+    assert "model union, decay 0.075 (on land), up to 20 diameters" in told
+    assert "(mine) says: a pulse of 200 ns and a probe of 64 FFT points taken for k" in told
+    assert "head of mine: it turns at any speed" in told
+
+
+@pytest.mark.parametrize(("shares", "read"), [((0.4, 0.595), True), ((40, 60.9), True), ((10, 20), False)])
+def test_shares_of_a_rose_add_up(tmp_path: Path, shares: tuple[float, float], read: bool) -> None:
+    path = tmp_path / "rose.csv"
+    path.write_text(f"direction_deg,share\n0,{shares[0]}\n180,{shares[1]}\n", encoding="utf-8")
+    if read:
+        assert load_rose(path).share.sum() == pytest.approx(1.0)
+        return
+    with pytest.raises(InputError, match="add up to 30"):
+        load_rose(path)
