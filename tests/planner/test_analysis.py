@@ -405,7 +405,7 @@ def test_answers_that_end_too_early_retrieve_nothing(
 @pytest.mark.parametrize(
     ("option", "told"),
     [
-        (("--days", "0"), "ten-minute"),
+        (("--days", "0"), "more than 0"),
         (("--lost", "2"), "share"),
         (("--format", "xls"), "allowed: csv"),
         (("--url", "x"), "--format database"),

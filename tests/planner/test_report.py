@@ -307,9 +307,8 @@ def test_blocked_rays_are_counted_and_said_beside_the_prediction(hovsore: Plan) 
     assert entry["blocked_remark"] == (
         "13 of 30 rays are blocked, 2 of them in every wind; the prediction counts them as measured"
     )
-    assert all(
-        entry["blocked_remark"] is None for entry in error_entries(Plan(small(obstacles=[], turbines=[])))
-    )
+    clear = Plan(small(obstacles=[], turbines=[]))
+    assert all(entry["blocked_remark"] is None for entry in error_entries(clear, clear.default_errors))
 
 
 def test_positions_have_the_latitude_and_longitude_of_proj() -> None:

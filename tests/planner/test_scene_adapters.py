@@ -241,7 +241,7 @@ def test_gltf_is_read_back_with_names_sizes_and_axes() -> None:
 def test_gltf_without_its_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """The user learns what to install."""
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(UnavailableError, match=r"lidarplan\[gltf\]"):
+    with pytest.raises(UnavailableError, match=r"'\.\[gltf\]'"):
         gltf_adapter.to_glb(hovsore())
 
 
