@@ -63,8 +63,9 @@ def refraction_lift_m(
     Returns
     -------
     FloatArray
-        Lift [m], positive upward, same shape. A beam that is to hit the point is aimed this much below the
-        straight line's drop: the net drop is ``curvature_drop_m - refraction_lift_m``.
+        Lift [m], positive upward, same shape. A beam sags by this much below its straight line, so it is aimed that
+        much above the point to hit it; over the curved ground its net drop is
+        ``curvature_drop_m - refraction_lift_m``.
 
     Notes
     -----
