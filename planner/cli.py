@@ -20,6 +20,7 @@ from geometry.errors import LidarplanError, UnavailableError
 COMMANDS = (
     "new",
     "point",
+    "crossings",
     "check",
     "wakes",
     "errors",

@@ -29,3 +29,21 @@ def by_severity(findings: list[Finding]) -> list[Finding]:
     ['range-max', 'gate-offset']
     """
     return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))
+
+
+def told_once(findings: list[Finding]) -> list[Finding]:
+    """What people read: findings of one code in the same words become one, with all their subjects.
+
+    Examples
+    --------
+    >>> fast = Finding("warning", "radial-speed", "stare K", 31.9, "m/s", 30.0, "over the limit")
+    >>> [finding.subject for finding in told_once([fast, fast._replace(subject="stare W")])]
+    ['stare K, stare W']
+    """
+    same: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        same.setdefault((finding.severity, finding.code, finding.text), []).append(finding)
+    return [
+        group[0]._replace(subject=", ".join(dict.fromkeys(finding.subject for finding in group)))
+        for group in same.values()
+    ]

@@ -30,7 +30,7 @@ from planner.figures.sector_error import sector_error
 from planner.figures.site_map import site_map
 from planner.figures.tradeoff import tradeoff_figure
 from planner.figures.wake_rose import wake_rose
-from planner.finding import Finding
+from planner.finding import Finding, told_once
 from planner.output import output_folder
 from planner.plan import Plan
 from planner.plan_scene import plan_scene
@@ -77,8 +77,8 @@ class SiteReport:
 
     @cached_property
     def findings(self) -> list[Finding]:
-        """Errors first."""
-        return findings(self.plan)
+        """Errors first, each told once with all its subjects."""
+        return told_once(findings(self.plan))
 
     @cached_property
     def errors(self) -> list[Entry]:

@@ -27,16 +27,17 @@ def check(
     from planner.checks import findings
     from planner.commands.load import load_plan
     from planner.commands.table import print_table
-    from planner.finding import SEVERITIES
+    from planner.finding import SEVERITIES, told_once
 
     plan = load_plan(site, fidelity)
     remark(f"site at {_where(*plan.longitude_latitude_deg)}", quiet=quiet)
     found = findings(plan)
-    counts = [sum(finding.severity == severity for finding in found) for severity in SEVERITIES]
+    told_of = told_once(found)
+    counts = [sum(finding.severity == severity for finding in told_of) for severity in SEVERITIES]
     if json:
         say_json([finding._asdict() for finding in found])
-    elif found:
-        rows = [(finding.severity, finding.code, finding.subject, finding.text) for finding in found]
+    elif told_of:
+        rows = [(finding.severity, finding.code, finding.subject, finding.text) for finding in told_of]
         print_table("", ("severity", "code", "subject", "finding"), rows, fold="finding")
     else:
         say("Nothing found.")

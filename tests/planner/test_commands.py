@@ -59,6 +59,16 @@ def test_check_exits_1_where_a_finding_is_an_error(capsys: pytest.CaptureFixture
     assert {row["severity"] for row in hovsore} == {"warning", "info"}
 
 
+def test_crossings_shows_healthy_pairs_too(capsys: pytest.CaptureFixture[str]) -> None:
+    """The published opening angle of Høvsøre is 63°; at Kassel WS7 and WS8 look at each other."""
+    (dual,) = document(capsys, "crossings", HOVSORE)
+    assert round(dual["opening_angle_deg"]) == 63
+    assert len(dual["point_m"]) == 3
+    assert [row["pair"] for row in document(capsys, "crossings", KASSEL) if row["folded_angle_deg"] < 10] == [
+        "WS7+WS8 at P4"
+    ]
+
+
 def test_wakes_gives_sectors_as_pairs(capsys: pytest.CaptureFixture[str]) -> None:
     rows = document(capsys, "wakes", HOVSORE)
     assert all(set(row) >= WAKES_KEYS for row in rows)
@@ -76,13 +86,13 @@ def test_wakes_of_a_site_without_turbines_loses_nothing(capsys: pytest.CaptureFi
     assert {(row["lost_share"], str(row["free_deg"])) for row in rows} == {(0.0, "[[0.0, 360.0]]")}
 
 
-@pytest.mark.parametrize("command", ["point", "check", "wakes"])
+@pytest.mark.parametrize("command", ["point", "check", "crossings", "wakes"])
 def test_tables_fit_on_a_page_and_remarks_go_to_stderr(
     capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     assert run([command, HOVSORE]) == 0
     told = capsys.readouterr()
-    assert "WS_S" in told.out or "sector" in told.out
+    assert "WS_S" in told.out or "sector" in told.out or "stare K" in told.out
     assert max(map(len, told.out.splitlines())) <= 220
     assert told.err.strip()
     assert run([command, HOVSORE, "--quiet"]) == 0
