@@ -1,6 +1,6 @@
 """Which rays of each scan meet a rotor, a tower, a mast, an obstacle or the ground on their way to the gate."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -73,6 +73,21 @@ def reach_m(layout: ScanLayout) -> FloatArray:
     return np.full(layout.scan.count, (ranges.max() if ranges.size else last_m) + half_m)
 
 
+def lost_ranges_m(met: Sequence[Obstruction], layout: ScanLayout) -> FloatArray:
+    """Where each ray of a scan first meets something solid.
+
+    Returns
+    -------
+    FloatArray
+        (ray,) slant range [m]; infinite for a free ray.
+    """
+    lost_m = np.full(layout.scan.count, np.inf)
+    for item in met:
+        if item.scan == layout.name:
+            lost_m = np.where(item.lost, np.minimum(lost_m, item.range_m), lost_m)
+    return lost_m
+
+
 def margin_m(lidar: Lidar, range_m: float) -> float:
     """How far a lidar's beam may be off at a range [m]: two standard deviations of pointing and position.
 
@@ -120,7 +135,7 @@ def ground_met_m(height_m: float, elevation_deg: ArrayLike) -> FloatArray:
 
 
 def _of_ground(places: Places, layout: ScanLayout) -> Iterator[Obstruction]:
-    """Rays that meet the level ground; not where a terrain says that it is not level.
+    """Rays that meet the level ground; where a terrain says that it is not level, see `planner.over_terrain`.
 
     A head that is declared a little below the ground stands on it. A target below the ground is a fault of
     its own.

@@ -11,10 +11,11 @@ from geometry.beams import beam_to
 from geometry.crossing import cross
 from geometry.errors import InputError
 from planner.crossings import PairCrossing, beam_line
-from planner.obstruction import reach_m
+from planner.obstruction import lost_ranges_m, reach_m
 from planner.palette import EXCLUDED, OBSTACLE, lidar_colour
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
+from planner.scan_plans import PointsScan, RasterScan
 from planner.scene import Label, Layer, Points, Scene, layers, views
 from planner.scene.model import View, positions_m
 from planner.scene.structures import obstacle
@@ -44,7 +45,14 @@ def plan_scene(plan: Plan) -> Scene:
     InputError
         If the site has nothing that could be drawn.
     """
-    standing = [*_scans(plan), *_targets(plan), *_structures(plan), *_wakes(plan), *_crossings(plan)]
+    standing = [
+        *_scans(plan),
+        *_targets(plan),
+        *_structures(plan),
+        *_wakes(plan),
+        *_lost(plan),
+        *_crossings(plan),
+    ]
     if not standing:
         raise InputError("the site has nothing to draw: give at least one lidar, mast, turbine or target")
     ground = layers.ground_layers(standing, height_m=GROUND_M)
@@ -145,6 +153,17 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
             ground_m=GROUND_M,
             scan=_short(layout.name),
         )
+    if isinstance(layout.spec, PointsScan | RasterScan):
+        return layers.spokes_layer(
+            _short(layout.lidar.name),
+            colour,
+            head,
+            azimuth_deg,
+            elevation_deg,
+            measured_range_m=reach_m(layout)[::step] - probe_m / 2,
+            probe_length_m=probe_m,
+            scan=_short(layout.name),
+        )
     return layers.fan_layer(
         _short(layout.lidar.name),
         colour,
@@ -157,6 +176,31 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
         closed=layout.spec.type == "ppi",
         scan=_short(layout.name),
     )
+
+
+def _lost(plan: Plan) -> Iterator[Layer]:
+    """What the rays of all scans do not see behind something solid, in one layer."""
+    ends = [_lost_ends_m(plan, layout) for layout in plan.layouts]
+    lost = np.concatenate([np.empty((0, 2, 3)), *ends])
+    if len(lost):
+        yield layers.lost_layer(lost[:, 0], lost[:, 1], hover="lost behind something solid")
+
+
+def _lost_ends_m(plan: Plan, layout: ScanLayout) -> FloatArray:
+    """(lost ray, 2, 3) where each lost ray meets something solid, and where it should have measured [m]."""
+    step = -(-layout.scan.count // MOST_RAYS)
+    met_m, wanted_m = lost_ranges_m(plan.obstructions, layout)[::step], reach_m(layout)[::step]
+    lost = met_m < wanted_m
+    ends = [
+        plan.places.beam_local_m(
+            layout.lidar,
+            layout.scan.azimuth_deg[::step][lost],
+            layout.scan.elevation_deg[::step][lost],
+            range_m[lost],
+        )
+        for range_m in (met_m, wanted_m)
+    ]
+    return np.stack(ends, axis=1)
 
 
 def _targets(plan: Plan) -> Iterator[Layer]:

@@ -13,6 +13,7 @@ from geometry.wakes import wake_outline_m
 from planner.crossings import beam_line
 from planner.exclusion import Exclusion
 from planner.figures.names import Name, shown
+from planner.obstruction import lost_ranges_m
 from planner.palette import (
     CROSSING,
     EXCLUDED,
@@ -103,7 +104,7 @@ def _fan(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
     )[:, :2]
     ring = np.vstack([head, arc, head])
     (area,) = axes.fill(ring[:, 0], ring[:, 1], color=colour, alpha=0.10, linewidth=0, zorder=2)
-    lost_m = _lost_ranges_m(plan, layout)
+    lost_m = lost_ranges_m(plan.obstructions, layout)
     for end, lost in zip(arc[1:-1], lost_m, strict=True):
         if layout.scan.count <= FEW_RAYS:
             stop = head + (end - head) * min(lost / reach_m, 1.0)
@@ -122,15 +123,6 @@ def _fan(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
         *lost,
     ]
     return Layer([np.vstack([head, arc])], [], [*edge, arc], legend)
-
-
-def _lost_ranges_m(plan: Plan, layout: ScanLayout) -> FloatArray:
-    """(ray,) range where each ray meets something solid; infinite for a free ray [m]."""
-    lost_m = np.full(layout.scan.count, np.inf)
-    for met in plan.obstructions:
-        if met.scan == layout.name:
-            lost_m = np.where(met.lost, np.minimum(lost_m, met.range_m), lost_m)
-    return lost_m
 
 
 def _lost(axes: "Axes", head: FloatArray, ends: FloatArray, share: FloatArray) -> list[tuple[Any, str]]:
@@ -177,7 +169,7 @@ def _ray(plan: Plan, axes: "Axes", layout: ScanLayout, ray: int, reach_m: float,
     ranges_m = np.array([0.0, reach_m - half_m, reach_m + half_m, reach_m])
     azimuth_deg, elevation_deg = layout.scan.azimuth_deg[ray], layout.scan.elevation_deg[ray]
     points = plan.places.beam_local_m(layout.lidar, azimuth_deg, elevation_deg, ranges_m)[:, :2]
-    lost = _lost_ranges_m(plan, layout)[ray]
+    lost = lost_ranges_m(plan.obstructions, layout)[ray]
     stop = points[0] + (points[3] - points[0]) * min(lost / reach_m, 1.0)
     (line,) = axes.plot(*np.stack([points[0], stop]).T, color=colour, linewidth=linewidth, zorder=4)
     axes.plot(*points[1:3].T, color=colour, linewidth=6, alpha=0.6, solid_capstyle="butt", zorder=5)

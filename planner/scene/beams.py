@@ -191,6 +191,65 @@ def scan_fan(
     )
 
 
+class Spokes(NamedTuple):
+    """The parts of rays that are each drawn for itself."""
+
+    rays: Lines  # head to the measured gate and half its probe
+    probes: Lines  # the measured gate of each ray, as long as its probe
+    gates: Points
+
+
+def spokes(
+    head_m: ArrayLike,
+    azimuth_deg: ArrayLike,
+    elevation_deg: ArrayLike,
+    *,
+    measured_range_m: ArrayLike,
+    probe_length_m: float,
+    name: str = "",
+) -> Spokes:
+    """Draw rays that measure nothing on the way from one to the next: a list of points, a raster.
+
+    Parameters
+    ----------
+    head_m
+        (3,) Scanner head [m].
+    azimuth_deg, elevation_deg
+        (ray,) Directions of the rays [deg].
+    measured_range_m
+        (ray,) Centre of each ray's gate, or one for all [m].
+    probe_length_m
+        Full width at half maximum of the gate's weighting [m].
+    name
+        What the hover text calls the lidar.
+
+    Examples
+    --------
+    >>> s = spokes([0, 0, 0], [80, 90], [0, 5], measured_range_m=[480, 980], probe_length_m=40)
+    >>> round(s.rays.length_m, 6), round(s.probes.length_m, 6)
+    (1500.0, 80.0)
+    """
+    azimuth, elevation, range_m = np.broadcast_arrays(
+        *(
+            np.atleast_1d(np.asarray(v, dtype=np.float64))
+            for v in (azimuth_deg, elevation_deg, measured_range_m)
+        )
+    )
+    near, middle, far = (
+        along_rays_m(head_m, azimuth, elevation, range_m + share * probe_length_m)
+        for share in (-0.5, 0.0, 0.5)
+    )
+    hover = tuple(
+        f"{name}: ray {i}, azimuth {a:.2f}°, elevation {e:.2f}°, range {r:.1f} m"
+        for i, (a, e, r) in enumerate(zip(azimuth, elevation, range_m, strict=True))
+    )
+    return Spokes(
+        rays=segments_between(np.asarray(head_m, dtype=np.float64), far, width_px=1.2, opacity=0.55),
+        probes=segments_between(near, far, width_px=6.0),
+        gates=Points(middle, size_px=5.0, hover=hover),
+    )
+
+
 def range_arcs(
     centre_m: ArrayLike, radii_m: ArrayLike, *, from_deg: float = 0.0, width_deg: float = 360.0
 ) -> Lines:

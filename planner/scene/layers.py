@@ -166,6 +166,64 @@ def fan_layer(
     )
 
 
+def spokes_layer(
+    name: str,
+    colour: str,
+    head_m: ArrayLike,
+    azimuth_deg: ArrayLike,
+    elevation_deg: ArrayLike,
+    *,
+    measured_range_m: ArrayLike,
+    probe_length_m: float,
+    scan: str = "points",
+) -> Layer:
+    """Draw a lidar that goes from ray to ray: each with the gate that it measures.
+
+    The parameters are those of `beams.spokes`; `scan` names the layer after the lidar.
+
+    Examples
+    --------
+    >>> spokes_layer("S", "#d55e00", [0, 0, 2], [80, 90], 5.0, measured_range_m=400, probe_length_m=40).name
+    'S: points'
+    """
+    parts = beams.spokes(
+        head_m,
+        azimuth_deg,
+        elevation_deg,
+        measured_range_m=measured_range_m,
+        probe_length_m=probe_length_m,
+        name=name,
+    )
+    return Layer(
+        f"{name}: {scan}",
+        colour,
+        (*parts, *_head(name, head_m)),
+        about="thick: the gate that each ray measures",
+    )
+
+
+def lost_layer(starts_m: ArrayLike, ends_m: ArrayLike, hover: str = "") -> Layer:
+    """Draw what rays do not see: from where each meets something solid to where it should have measured.
+
+    Parameters
+    ----------
+    starts_m, ends_m
+        (ray, 3) [m].
+    hover
+        Text under the pointer.
+
+    Examples
+    --------
+    >>> lost_layer([[0, 500, 60]], [[0, 1100, 120]]).name
+    'lost'
+    """
+    starts = np.asarray(starts_m, dtype=np.float64)
+    lines = segments_between(starts, ends_m, width_px=3.5, hover=hover)
+    return Layer(
+        "lost", palette.EXCLUDED, (lines, Points(starts, size_px=7.0)), about="rays behind something solid"
+    )
+
+
 def _head(name: str, head_m: ArrayLike) -> tuple[Item, ...]:
     head = np.asarray(head_m, dtype=np.float64)
     dot = Points(head[None, :], size_px=15.0, hover=(name,))
