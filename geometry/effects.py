@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.arrays import ArrayLike, FloatArray
 from geometry.earth import EARTH_RADIUS_M, curvature_drop_m, refraction_lift_m
-from geometry.frames import SiteFrame, model_error_m
+from geometry.frames import EarthModel, SiteFrame
 
 # A fair guess where a site does not state its undulation: Europe has 25 to 55 m (EGM2008), the Earth at most
 # 107 m.
@@ -86,3 +86,39 @@ def _undulation_m(frame: SiteFrame) -> float:
     if frame.height_datum == "ellipsoidal":
         return 0.0
     return UNKNOWN_UNDULATION_M if frame.geoid_undulation_m is None else frame.geoid_undulation_m
+
+
+def model_error_m(
+    frame: SiteFrame, origin_m: ArrayLike, points_m: ArrayLike, model: EarthModel
+) -> FloatArray:
+    """Distance by which an earth model misses the exact position of points.
+
+    Parameters
+    ----------
+    frame
+        The site's frame.
+    origin_m
+        Easting, northing, height of the head [m], shape (3,).
+    points_m
+        Easting, northing, height [m], shape (..., 3).
+    model
+        One of the five earth models.
+
+    Returns
+    -------
+    FloatArray
+        Distance between the model's and the exact east-north-up position [m], shape (...). For ``refracted``
+        it contains the lift itself, which is not an error but where the bent beam is to be aimed.
+
+    Examples
+    --------
+    >>> frame, head = SiteFrame("EPSG:32632"), [448937.717, 6256404.894, 5.409]
+    >>> mast = [447647.39, 6255435.76, 121.336]
+    >>> for model in ("flat-grid", "flat", "curved"):
+    ...     print(model, round(float(model_error_m(frame, head, mast, model)), 3))
+    flat-grid 19.458
+    flat 0.204
+    curved 0.002
+    """
+    exact = frame.enu_m(origin_m, points_m)
+    return np.asarray(np.linalg.norm(frame.enu_m(origin_m, points_m, model=model) - exact, axis=-1))

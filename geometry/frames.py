@@ -2,7 +2,7 @@
 
 Five earth models stand behind one interface. `exact` goes through earth-centred coordinates; the others are
 cheaper and each knows what it leaves out (`LEFT_OUT`) and can be measured against `exact` at the very points
-in question (`model_error_m`).
+in question (`geometry.effects.model_error_m`).
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from geometry.tangent import Tangent
 EarthModel = Literal["exact", "flat-grid", "flat", "curved", "refracted"]
 HeightDatum = Literal["above_sea_level", "ellipsoidal"]
 
-# What each earth model leaves out, for the list of what a scene needs; `model_error_m` gives the size.
+# What each earth model leaves out, for the list of what a scene needs; `geometry.effects.model_error_m` gives the size.
 _ALONG_BEAM = "change of scale and convergence along the beam"
 _VERTICAL = "deflection of the vertical"
 LEFT_OUT: Mapping[EarthModel, tuple[str, ...]] = MappingProxyType(
@@ -380,42 +380,6 @@ class SiteFrame:
             eccentricity_squared=projection.eccentricity_squared,
         )
         return Tangent(jacobian, float(radius + height))
-
-
-def model_error_m(
-    frame: SiteFrame, origin_m: ArrayLike, points_m: ArrayLike, model: EarthModel
-) -> FloatArray:
-    """Distance by which an earth model misses the exact position of points.
-
-    Parameters
-    ----------
-    frame
-        The site's frame.
-    origin_m
-        Easting, northing, height of the head [m], shape (3,).
-    points_m
-        Easting, northing, height [m], shape (..., 3).
-    model
-        One of the five earth models.
-
-    Returns
-    -------
-    FloatArray
-        Distance between the model's and the exact east-north-up position [m], shape (...). For ``refracted``
-        it contains the lift itself, which is not an error but where the bent beam is to be aimed.
-
-    Examples
-    --------
-    >>> frame, head = SiteFrame("EPSG:32632"), [448937.717, 6256404.894, 5.409]
-    >>> mast = [447647.39, 6255435.76, 121.336]
-    >>> for model in ("flat-grid", "flat", "curved"):
-    ...     print(model, round(float(model_error_m(frame, head, mast, model)), 3))
-    flat-grid 19.458
-    flat 0.204
-    curved 0.002
-    """
-    exact = frame.enu_m(origin_m, points_m)
-    return np.asarray(np.linalg.norm(frame.enu_m(origin_m, points_m, model=model) - exact, axis=-1))
 
 
 def _bending(model: EarthModel) -> float:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.effects import effect_sizes_m
-from geometry.frames import EarthModel, model_error_m
+from geometry.effects import effect_sizes_m, model_error_m
+from geometry.frames import EarthModel
 from planner.places import Places
 from planner.site import Site
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from geometry.arrays import FloatArray
 from geometry.beams import Beam, beam_to
+from geometry.effects import model_error_m
 from geometry.errors import InputError
-from geometry.frames import EarthModel, model_error_m
+from geometry.frames import EarthModel
 from planner.fidelity_wind import Air
 from planner.places import Places
 from reconstruct.flight import Sampling

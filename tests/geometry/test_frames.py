@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from geometry.beams import beam_to, point_at
 from geometry.earth import REFRACTION_COEFFICIENT, curvature_drop_m
+from geometry.effects import model_error_m
 from geometry.errors import InputError
-from geometry.frames import LEFT_OUT, EarthModel, SiteFrame, model_error_m
+from geometry.frames import LEFT_OUT, EarthModel, SiteFrame
 from geometry.projection import projection_of
 
 few = settings(derandomize=True, max_examples=60, deadline=None)

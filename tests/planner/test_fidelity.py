@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from geometry.frames import model_error_m
+from geometry.effects import model_error_m
 from planner.files.yaml_site import load_site
 from planner.plan import Plan
 
