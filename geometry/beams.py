@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import ArrayLike, FloatArray
+from geometry.arrays import ArrayLike, FloatArray, positions
 from geometry.blocks import blocks
-from geometry.errors import InputError
 
 DEG_PER_RAD = 180.0 / np.pi
 
@@ -57,12 +56,7 @@ def beam_to(enu_m: ArrayLike) -> Beam:
     >>> beam.azimuth_deg.tolist(), beam.elevation_deg.round(3).tolist(), beam.range_m.tolist()
     ([0.0, 270.0, 0.0], [0.0, 53.13, 90.0], [1000.0, 500.0, 50.0])
     """
-    enu = np.asarray(enu_m, dtype=np.float64)
-    if enu.ndim == 0 or enu.shape[-1] != 3:
-        raise InputError(
-            f"positions of shape {enu.shape} came; allowed is (..., 3): east, north, up in metres. "
-            "Put the three coordinates on the last axis."
-        )
+    enu = positions(enu_m, "east, north, up")
     points = enu.reshape(-1, 3)
     solved = np.empty((3, points.shape[0]))
     for block in blocks(points.shape[0]):

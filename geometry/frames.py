@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from geometry.arrays import ArrayLike, FloatArray
+from geometry.arrays import ArrayLike, FloatArray, positions
 from geometry.earth import REFRACTION_COEFFICIENT, ecef_to_enu_rotation, gaussian_radius_m
 from geometry.errors import InputError
 from geometry.projection import Projection, central_meridian_deg, projection_of
@@ -42,6 +42,8 @@ _BENDING: Mapping[EarthModel, float] = MappingProxyType(
 # Step of the central difference that gives the grid's scale and turn at a head: 100 m keeps both the
 # third-order term ((step/R)^2 = 2e-10) and the rounding (1e-9 m / step = 1e-11) under a micrometre in 3 km.
 JACOBIAN_STEP_M = 100.0
+
+GRID_AXES = "easting, northing, height"
 
 # Undulations of the geoid lie between -107 and +86 m: Pavlis et al. (2012), J. Geophys. Res. 117, B04406.
 MAX_UNDULATION_M = 120.0
@@ -137,7 +139,9 @@ class SiteFrame:
         (8.15089, 56.44054, 4.8)
         """
         projection = self._projection
-        degrees = projection.transform(projection.to_geographic, self._ellipsoidal(_points(points_m)))
+        degrees = projection.transform(
+            projection.to_geographic, self._ellipsoidal(positions(points_m, GRID_AXES))
+        )
         longitude = degrees[..., 0] + projection.prime_meridian_deg
         longitude = np.where(np.abs(longitude) > 180.0, np.mod(longitude + 180.0, 360.0) - 180.0, longitude)
         return longitude, degrees[..., 1].copy(), degrees[..., 2].copy()
@@ -279,7 +283,7 @@ class SiteFrame:
         flat [0.0, 6002.4, 0.0]
         flat-grid [0.0, 6000.0, 0.0]
         """
-        origin, points = _origin(origin_m), _points(points_m)
+        origin, points = _origin(origin_m), positions(points_m, GRID_AXES)
         if model == "exact":
             return self._exact_enu(origin, points)
         if model == "flat-grid":
@@ -320,7 +324,7 @@ class SiteFrame:
         >>> frame.projected_m(head, frame.enu_m(head, [447647.39, 6255435.76, 121.336])).round(3).tolist()
         [447647.39, 6255435.76, 121.336]
         """
-        origin, enu = _origin(origin_m), _points(enu_m)
+        origin, enu = _origin(origin_m), positions(enu_m, "east, north, up")
         if model == "exact":
             return self._exact_projected(origin, enu)
         if model == "flat-grid":
@@ -343,7 +347,9 @@ class SiteFrame:
     def _datum_degrees(self, points_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Longitude from the datum's own prime meridian, as PROJ's factors want it, and latitude [deg]."""
         projection = self._projection
-        degrees = projection.transform(projection.to_geographic, self._ellipsoidal(_points(points_m)))
+        degrees = projection.transform(
+            projection.to_geographic, self._ellipsoidal(positions(points_m, GRID_AXES))
+        )
         return degrees[..., 0].copy(), degrees[..., 1].copy()
 
     def _head(self, origin: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -389,20 +395,9 @@ def _bending(model: EarthModel) -> float:
     return _BENDING[model]
 
 
-def _points(points_m: ArrayLike) -> FloatArray:
-    """Check that positions have three coordinates on the last axis."""
-    points = np.asarray(points_m, dtype=np.float64)
-    if points.ndim == 0 or points.shape[-1] != 3:
-        raise InputError(
-            f"positions of shape {points.shape} came; allowed is (..., 3): easting, northing, height in "
-            "metres. Put the three coordinates on the last axis."
-        )
-    return points
-
-
 def _origin(origin_m: ArrayLike) -> FloatArray:
     """Check that a head is one finite position."""
-    origin = _points(origin_m)
+    origin = positions(origin_m, GRID_AXES)
     if origin.shape != (3,) or not np.isfinite(origin).all():
         raise InputError(
             f"head position {origin.tolist()} of shape {origin.shape} came; allowed are three finite "
