@@ -115,7 +115,7 @@ def circular_mean_deg(
     Notes
     -----
     :math:`\bar\theta = \mathrm{atan2}(\sum w\sin\theta, \sum w\cos\theta)`: Mardia & Jupp (2000), Directional
-    Statistics, eq. 2.2.4.
+    Statistics, chapter 2.
 
     Examples
     --------

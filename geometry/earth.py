@@ -8,7 +8,7 @@ from geometry.arrays import ArrayLike, FloatArray
 EARTH_RADIUS_M = 6_371_008.8
 
 # Share of the Earth's curvature by which light near the ground bends down: the classical surveyor's value for
-# optical and near-infrared beams, Torge & Müller (2012), Geodesy, sec. 5.1.1. (The radar "4/3 Earth", 0.25,
+# optical and near-infrared beams: Torge & Müller (2012), Geodesy, on refraction. (The radar "4/3 Earth", 0.25,
 # is for radio waves.) It varies with the temperature profile near the ground.
 REFRACTION_COEFFICIENT = 0.13
 
@@ -32,7 +32,6 @@ def curvature_drop_m(distance_m: ArrayLike, radius_m: ArrayLike = EARTH_RADIUS_M
     -----
     :math:`d^2/2R`: the first term of :math:`R(\sec(d/R)-1)`; the next, :math:`5d^4/24R^3`, is 0.02 mm at
     12 km and 0.7 mm at 30 km.
-    Torge & Müller (2012), Geodesy, sec. 5.1.
 
     Examples
     --------
@@ -100,7 +99,8 @@ def gaussian_radius_m(
 
     Notes
     -----
-    :math:`\sqrt{MN} = a\sqrt{1-e^2}/(1-e^2\sin^2\varphi)`: Torge & Müller (2012), Geodesy, eq. 4.20.
+    :math:`\sqrt{MN} = a\sqrt{1-e^2}/(1-e^2\sin^2\varphi)`: the Gaussian radius of curvature; Torge &
+    Müller (2012), Geodesy, on the curvature of the ellipsoid.
 
     Examples
     --------
@@ -130,8 +130,8 @@ def ecef_to_enu_rotation(longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> F
     -----
     Rows :math:`(-\sin\lambda, \cos\lambda, 0)`,
     :math:`(-\sin\varphi\cos\lambda, -\sin\varphi\sin\lambda, \cos\varphi)` and
-    :math:`(\cos\varphi\cos\lambda, \cos\varphi\sin\lambda, \sin\varphi)`: EPSG Guidance Note 7-2, sec. 4.1.2
-    (geocentric/topocentric conversions, method 9836).
+    :math:`(\cos\varphi\cos\lambda, \cos\varphi\sin\lambda, \sin\varphi)`: EPSG Guidance Note 7-2
+    (IOGP 373-07-02), method 9836, geocentric/topocentric conversions; its example is a test.
 
     Examples
     --------

@@ -13,7 +13,7 @@ from geometry.frames import EarthModel, SiteFrame
 UNKNOWN_UNDULATION_M = 40.0
 
 # Rough upper bound of the deflection of the vertical in mountains; over plains and sea 5 arc seconds is
-# usual: Torge & Müller (2012), Geodesy, sec. 6.7.
+# usual. A round number, not measured at any site.
 DEFLECTION_ARCSEC = 30.0
 
 

@@ -253,8 +253,8 @@ class SiteFrame:
 
         Notes
         -----
-        The exact model rotates earth-centred differences into the head's axes: EPSG Guidance Note 7-2, sec.
-        4.1.2. Largest error of the others against it, in metres, over all directions, up to 500 m above the
+        The exact model rotates earth-centred differences into the head's axes: EPSG Guidance Note 7-2,
+        method 9836. Largest error of the others against it, in metres, over all directions, up to 500 m above the
         head, in UTM (EPSG:32632; `model_error_m` gives it for any scene, and the tests hold these numbers):
 
         ============ ======= ======= ======= ========= =======================================

@@ -144,7 +144,7 @@ class Probe:
 
     References
     ----------
-    Banakh, V. A. and Smalikho, I. N. (1997), Atmos. Oceanic Opt. 10, 957-965: the weighting of a pulsed
+    Banakh, V. A. and Smalikho, I. N. (1997), Atmos. Oceanic Opt. 10(12), 957-965: the weighting of a pulsed
     lidar as a Gaussian pulse convolved with the window of its spectral estimate.
 
     Examples

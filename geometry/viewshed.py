@@ -11,7 +11,8 @@ import numpy as np
 from geometry.arrays import ArrayLike, FloatArray
 from geometry.earth import REFRACTION_COEFFICIENT
 from geometry.errors import InputError
-from geometry.terrain import HeightRaster, bulge_m
+from geometry.terrain import HeightRaster
+from geometry.terrain_sight import bulge_m
 
 # Distance of neighbouring spokes at the far end, and of samples along them, in cells.
 SPOKE_CELLS = 1.0

@@ -17,7 +17,7 @@ from geometry.errors import InputError
 DECAY_ONSHORE = 0.075
 DECAY_OFFSHORE = 0.04
 
-# Distances over diameters between which IEC 61400-12-1, Annex A, means its formula.
+# Distances over diameters between which IEC 61400-12-1, Annex A, means its formula (since 2022 in IEC 61400-12-5).
 IEC_NEAREST_DIAMETERS = 2.0
 IEC_FARTHEST_DIAMETERS = 20.0
 

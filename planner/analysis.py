@@ -2,7 +2,7 @@
 
 Each part of the data (a file, or a chunk of a store) is worked on once and its result is kept beside the
 output until the run is whole: a run that broke off goes on where it was. Nothing that grows with the campaign
-is held in memory but the sums of its periods.
+is held in memory.
 """
 
 import hashlib
@@ -10,34 +10,38 @@ import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from geometry.errors import InputError
 from planner.analysis_files import (
+    Result,
     Retrieved,
-    Sums,
     append_fast,
     file_name,
     write_fast_parquet,
     write_log,
     write_means,
 )
+from planner.attitude_files import Logged, logged, write_drifts
+from planner.beam_files import BeamParts, write_beams
 from planner.campaign import Campaign, RayInput
 from planner.files.yaml_campaign import Loaded
 from planner.kept_parts import Kept, read_kept, write_kept
 from planner.output import output_folder
-from planner.pair_retrieval import retrieve_pair
+from planner.pair_retrieval import partners_of, retrieve_pair
 from planner.plan import Plan
-from planner.ray_files import Part, at_gate, parts_of
-from planner.scan_retrieval import ScanJob, empty_part, job_of, retrieve_part
+from planner.pointing_log import NOTHING_KNOWN, Known, Pointed, pointed
+from planner.ray_files import Part, gate_of, parts_of
+from planner.scan_jobs import ScanJob, jobs_of
+from planner.scan_retrieval import add_steps, empty_part, retrieve_part
+from planner.sum_files import Key, SumFiles
+from reconstruct.attitude import LogMeans
 from reconstruct.automatic_filter import Agreement
 from reconstruct.filters import Step
 from reconstruct.records import Records, join
 
-if TYPE_CHECKING:
-    pass
-
-VERSION = 1  # of what is kept of a part; another one is worked on anew
+VERSION = 3  # of what is kept of a part; another one is worked on anew
 WORK = ".parts"
 
 Progress = Callable[[float], None]
@@ -68,28 +72,45 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
     work = campaign.output / WORK / key_of(loaded)
     if restart:
         shutil.rmtree(campaign.output / WORK, ignore_errors=True)
-    steps, agreements, notes, offsets = {}, {}, {}, {}
-    sums: Sums = {}
-    resumed = 0
+    todo = _jobs(campaign, plan)
+    jobs = {job.name: job for _, job in todo}
+    partners = {name for pair in campaign.pairs for name in partners_of(pair, plan, jobs)}
+    merged = {name: _Merged() for name in jobs}
+    sums = SumFiles(work / "sums")
+    beams: BeamParts = {}
     with output_folder(campaign.output) as folder:
-        for number, item in enumerate(campaign.inputs):
-            job = job_of(plan.layout[item.scan], plan.places, campaign.sizes_deg)
-            merged = _Merged()
+        for number, (item, job) in enumerate(todo):
             own = campaign if item.filters is None else campaign.model_copy(update={"filters": item.filters})
             for kept, was_there, share in _worked(item, job, own, plan, work):
-                merged.add(kept)
-                resumed += was_there
-                append_fast(folder, item.scan, kept.part.fast)
-                for (sector_deg, period_s), part in kept.part.sums.items():
-                    sums.setdefault((item.scan, sector_deg, period_s), []).append(part)
-                _tell(progress, (number + share) / (len(campaign.inputs) + bool(campaign.pairs)))
-            steps[item.scan], agreements[item.scan] = merged.steps, merged.agreement
-            notes[item.scan], offsets[item.scan] = merged.notes, merged.offset_deg
-        gaps = {}
-        for pair in campaign.pairs:
-            gaps[pair.pair] = retrieve_pair(pair, campaign, plan, work, folder, sums)
-        means = write_means(folder, campaign, plan, sums)
-        found = Retrieved(campaign.output, steps, agreements, notes, offsets, means, gaps, resumed)
+                part = kept.part
+                merged[job.name].add(kept, was_there=was_there)
+                if (
+                    job.kind == "fan" or job.name not in partners
+                ):  # a partner's rays are in the winds of its pair
+                    append_fast(folder, job.name, part.fast)
+                for (sector_deg, period_s), each in part.sums.items():
+                    sums.add(Key(job.name, sector_deg, period_s), each)
+                for period_s, radial in part.beams.items():
+                    beams.setdefault((job.name, period_s), []).append((radial, part.gates_m))
+                _tell(progress, (number + share) / (len(todo) + bool(campaign.pairs)))
+        gaps = {pair.pair: retrieve_pair(pair, campaign, plan, work, folder, sums) for pair in campaign.pairs}
+        write_beams(folder, plan.places, jobs, beams)
+        means = write_means(folder, campaign, _results(todo, campaign, plan), sums)
+        logs = {name: log for name, each in merged.items() if (log := each.logged) is not None}
+        write_drifts(folder, logs)
+        found = Retrieved(
+            folder=campaign.output,
+            steps={name: each.steps for name, each in merged.items()},
+            lost={name: each.lost for name, each in merged.items()},
+            agreements={name: each.agreement for name, each in merged.items()},
+            notes={name: each.notes for name, each in merged.items()},
+            offsets_deg={name: each.offset_deg for name, each in merged.items()},
+            alone=tuple(name for name, job in jobs.items() if job.kind != "fan" and name not in partners),
+            means=means,
+            gaps=gaps,
+            drifts=logs,
+            resumed=sum(each.resumed for each in merged.values()),
+        )
         write_fast_parquet(folder)
         write_log(folder, (campaign.name, loaded.site.name), found)
     shutil.rmtree(campaign.output / WORK, ignore_errors=True)
@@ -103,28 +124,61 @@ def key_of(loaded: Loaded) -> str:
     return hashlib.sha256(repr(told).encode()).hexdigest()[:16]
 
 
+def _jobs(campaign: Campaign, plan: Plan) -> list[tuple[RayInput, ScanJob]]:
+    """What is to be done, in the order of the inputs."""
+    return [
+        (item, job)
+        for item in campaign.inputs
+        for job in jobs_of(
+            plan.layout[item.scan],
+            plan.places,
+            item,
+            sizes_deg=campaign.sizes_deg,
+            columns=campaign.columns,
+        )
+    ]
+
+
+def _results(todo: list[tuple[RayInput, ScanJob]], campaign: Campaign, plan: Plan) -> dict[str, Result]:
+    """Height and usual interval of the winds of each scan; those of a pair come as often as its slowest scan."""
+    found = {job.name: Result(job.height_m, job.layout.scan.period_s) for _, job in todo}
+    for each in campaign.pairs:
+        pair = plan.site.pair(each.pair)
+        slowest_s = max(plan.layout[scan].scan.period_s for scan in pair.scans)
+        found[each.pair] = Result(plan.places.height_above_ground_m(pair.target), slowest_s)
+    return found
+
+
 class _Merged:
     """Counts and notes of the parts of one scan, added up."""
 
     def __init__(self) -> None:
-        self._steps: dict[str, Step] = {}
+        self.steps: tuple[Step, ...] = ()
+        self.lost: dict[str, int] = {}
+        self.resumed = 0  # parts that an earlier run had done
         self.agreement = Agreement(0, 0, 0, 0)
         self.notes: tuple[str, ...] = ()
         self.offset_deg = 0.0
+        self._logs: list[LogMeans] = []
+        self._unlogged = 0
 
     @property
-    def steps(self) -> tuple[Step, ...]:
-        """One of each name, in their order."""
-        return tuple(self._steps.values())
+    def logged(self) -> Logged | None:
+        """What the log of the attitude showed."""
+        return logged(self._logs, self._unlogged)
 
-    def add(self, kept: Kept) -> None:
+    def add(self, kept: Kept, *, was_there: bool) -> None:
         """Count another part."""
-        for step in kept.part.steps:
-            self._steps[step.name] = self._steps[step.name] + step if step.name in self._steps else step
+        self.resumed += was_there
+        self.steps = add_steps(self.steps, kept.part.steps)
+        for reason, count in kept.part.lost.items():
+            self.lost[reason] = self.lost.get(reason, 0) + count
         both = zip(self.agreement, kept.part.agreement, strict=True)
         self.agreement = Agreement(*(one + other for one, other in both))
         self.notes = tuple(dict.fromkeys((*self.notes, *kept.notes)))
         self.offset_deg = max(self.offset_deg, kept.part.offset_deg, key=abs)
+        self._logs += [] if kept.log is None else [kept.log]
+        self._unlogged += kept.unlogged
 
 
 def _worked(
@@ -132,16 +186,17 @@ def _worked(
 ) -> Iterator[tuple[Kept, bool, float]]:
     """The parts of one input, each worked on or taken from an earlier run, with the share that is done."""
     pending: Records | None = None
-    parts = parts_of(item, job.layout, plan.places, rays=campaign.chunk_rays)
+    known = NOTHING_KNOWN
+    parts = parts_of(item, job.layout, plan.places, job.range_m, rays=campaign.chunk_rays)
     for number, (part, last) in enumerate(_with_last(parts)):
-        place = work / f"{file_name(item.scan)}-{number:06d}.npz"
-        mark = f"{part.fingerprint} {_ends_of(pending)} {last}"
+        place = work / f"{file_name(job.name)}-{number:06d}.npz"
+        mark = f"{part.fingerprint} {_ends_of(pending)} {last} {known}"
         kept = read_kept(place, mark)
         was_there = kept is not None
         if kept is None:
-            kept = _work(part, pending, item, job, campaign, plan, last=last)
+            kept = _work(part, pending, known, item, job, campaign, plan, last=last)
             write_kept(place, mark, kept)
-        pending = kept.pending
+        pending, known = kept.pending, kept.known
         yield kept, was_there, part.share
 
 
@@ -161,6 +216,7 @@ def _ends_of(pending: Records | None) -> str:
 def _work(
     part: Part,
     pending: Records | None,
+    known: Known,
     item: RayInput,
     job: ScanJob,
     campaign: Campaign,
@@ -168,29 +224,35 @@ def _work(
     *,
     last: bool,
 ) -> Kept:
-    records, notes = _loaded(part, item, job, plan)
+    found, notes = _loaded(part, known, item, job, plan)
+    records = None if found is None else found.records
     if pending is not None:
         records = pending if records is None else join([pending, records])
+    told = (notes, known, None, 0) if found is None else (notes, found.known, found.log, found.unlogged)
     if records is None or not records.rays:
-        return Kept(empty_part(), None, notes)
+        return Kept(empty_part(), None, *told)
     later: Records | None = None
-    if not last and job.layout.scan.count > 1:
-        final = records.sweep_id == records.sweep_id[-1]
+    final = records.sweep_id == records.sweep_id[-1]
+    goes_on = not (last or part.whole or job.rays_stand_alone)
+    if goes_on and np.count_nonzero(final) <= campaign.chunk_rays:  # a pass that never ends is cut
         records, later = records.at_rays(~final), records.at_rays(final)
         later = replace(later, notes=(), losses=())
     worked = retrieve_part(records, job, campaign) if records.rays else empty_part()
-    return Kept(worked, later, notes)
+    return Kept(worked, later, *told)
 
 
-def _loaded(part: Part, item: RayInput, job: ScanJob, plan: Plan) -> tuple[Records | None, tuple[str, ...]]:
+def _loaded(
+    part: Part, known: Known, item: RayInput, job: ScanJob, plan: Plan
+) -> tuple[Pointed | None, tuple[str, ...]]:
     """The rays of a part at the gate, and what there is to say of them; a bad file among others is a note."""
     try:
-        records = at_gate(part.load(), item, job.layout, plan.places)
+        found = pointed(part.load(), item, job.layout, plan.places, known)
     except InputError as error:
         if part.alone:
             raise
         return None, (f"lost: {error}",)
-    return records, (*records.notes, *(f"lost: {loss}" for loss in records.losses))
+    records = gate_of(found.records, job.layout, job.range_m)
+    return found._replace(records=records), (*records.notes, *(f"lost: {loss}" for loss in records.losses))
 
 
 def _tell(progress: Progress | None, share: float) -> None:

@@ -3,39 +3,49 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.errors import InputError
+from planner.attitude_files import Logged, told_drifts
 from planner.campaign import Campaign
-from planner.plan import Plan
 from planner.scan_retrieval import periods_of
+from planner.sum_files import SumFiles
 from reconstruct.automatic_filter import Agreement
-from reconstruct.averaging import PeriodSums, TimeArray, add_sums, means_of
+from reconstruct.averaging import TimeArray, means_of
+from reconstruct.duck import bounded_duck, quoted
 from reconstruct.filters import Step
 from reconstruct.pairing import GapResult
+from reconstruct.retrieval import REASONS
 
-if TYPE_CHECKING:
-    import pandas as pd
+SPECIAL_TYPES = {"time_utc": "TIMESTAMP", "reason": "VARCHAR", "scan": "VARCHAR"}
+ALONE = (
+    "one lidar's beam alone: its radial speed, and the part of the wind along it; u, v, speed and direction need the "
+    "beam of another lidar (`pairs`)"
+)
 
-NO_SIZE = 0.0  # stands for the sector size of a pair among keys: NaN equals nothing, not even itself
 
-Sums = dict[tuple[str, float, float], list[PeriodSums]]
-"""Sums of a scan or pair by its name, sector size and period."""
+class Result(NamedTuple):
+    """What the tables say of a scan or pair beside its winds."""
+
+    height_m: float | None  # of what is measured, above the ground
+    interval_s: float  # usual time between its winds
 
 
 class Retrieved(NamedTuple):
     """What a run wrote and counted."""
 
     folder: Path
-    steps: dict[str, tuple[Step, ...]]  # by scan
+    steps: dict[str, tuple[Step, ...]]  # by scan, or by its points or gates
+    lost: dict[str, dict[str, int]]  # scans without a wind, by reason
     agreements: dict[str, Agreement]
     notes: dict[str, tuple[str, ...]]
     offsets_deg: dict[str, float]  # of the measured azimuths from the planned ones, the largest of the parts
-    means: dict[float, "pd.DataFrame"]  # by period [s]
-    gaps: dict[str, tuple[GapResult, ...]]  # by pair, without winds
+    alone: tuple[str, ...]  # beams that meet no other lidar's: radial speeds alone
+    means: dict[float, int]  # rows by period [s]; empty where there are radial speeds alone
+    gaps: dict[str, tuple[GapResult, ...]]  # by pair
+    drifts: dict[str, Logged]  # of attitude logs, by scan
     resumed: int  # parts that an earlier run had done
 
 
@@ -58,53 +68,58 @@ def append_fast(folder: Path, scan: str, fast: Mapping[str, FloatArray | TimeArr
         return
     path = folder / f"fast_{file_name(scan)}.csv"
     frame = pd.DataFrame(fast).sort_values(["time_utc", "sector_deg"], ascending=[True, False], kind="stable")
+    status = frame.pop("status").to_numpy(dtype=int)
+    frame["reason"] = np.array(("", *REASONS[1:]))[status]  # why a wind is not known
     frame.to_csv(path, mode="a", header=not path.exists(), index=False, float_format="%.5f", encoding="utf-8")
 
 
 def write_fast_parquet(folder: Path) -> None:
     """Write every table of single scans as Parquet too, row group by row group."""
-    import duckdb
-
-    with duckdb.connect() as connection:
-        for path in sorted(folder.glob("fast_*.csv")):
-            source, target = (str(name).replace("'", "''") for name in (path, path.with_suffix(".parquet")))
-            connection.execute(f"COPY (SELECT * FROM read_csv('{source}')) TO '{target}' (FORMAT parquet)")
+    for path in sorted(folder.glob("fast_*.csv")):
+        _copy_to_parquet(path)
 
 
-def write_means(folder: Path, campaign: Campaign, plan: Plan, sums: Sums) -> dict[float, "pd.DataFrame"]:
-    """Write the means of each period as CSV and Parquet: one row for each scan, size and period."""
-    import duckdb
-    import pandas as pd
+def _copy_to_parquet(path: Path) -> None:
+    """Write a CSV of ours as Parquet beside it."""
+    with path.open(encoding="utf-8") as file:
+        names = file.readline().strip().split(",")
+    kinds = {name: SPECIAL_TYPES.get(name, "DOUBLE") for name in names}  # a column may be empty
+    table = f"read_csv({quoted(path)}, header=true, columns={kinds!r})"
+    with bounded_duck(spill=path.parent) as connection:
+        target = quoted(path.with_suffix(".parquet"))
+        connection.execute(f"COPY (SELECT * FROM {table}) TO {target} (FORMAT parquet)")
 
-    tables: dict[float, pd.DataFrame] = {}
+
+def write_means(
+    folder: Path, campaign: Campaign, results: Mapping[str, Result], sums: SumFiles
+) -> dict[float, int]:
+    """Write the means of each period as CSV and Parquet: one row for each scan, size and period.
+
+    Nothing is written where no scan was meant to give a wind.
+
+    Returns
+    -------
+    dict
+        Rows by period [s].
+    """
+    rows: dict[float, int] = {}
     for period_s in periods_of(campaign):
-        frames = []
-        for (scan, sector_deg, length_s), parts in sums.items():
-            if length_s != period_s:
-                continue
-            means = means_of(add_sums(parts))
-            frame = means.frame()
-            frame.insert(0, "scan", scan)
-            frame.insert(1, "sector_deg", np.nan if sector_deg == NO_SIZE else sector_deg)
-            frame["availability"] = means.availability(_interval_s(plan, scan))
-            frames.append(frame)
-        if not frames:
-            raise InputError("no scan gave any wind: give a sector, or a pair of stares, among the inputs")
-        tables[period_s] = pd.concat(frames, ignore_index=True)
         path = folder / f"means_{period_s:g}s.csv"
-        tables[period_s].to_csv(path, index=False, float_format="%.5f", encoding="utf-8")
-        target = str(path.with_suffix(".parquet")).replace("'", "''")
-        with duckdb.connect() as connection:
-            connection.register("means", tables[period_s])
-            connection.execute(f"COPY means TO '{target}' (FORMAT parquet)")
-    return tables
-
-
-def _interval_s(plan: Plan, name: str) -> float:
-    """Usual time between the winds of a scan, or of a pair: that of its slowest scan [s]."""
-    if name in plan.layout:
-        return plan.layout[name].scan.period_s
-    return max(plan.layout[scan].scan.period_s for scan in plan.site.pair(name).scans)
+        for key, total in sums.totals(period_s):
+            means, told = means_of(total), results[key.name]
+            frame = means.frame()
+            frame.insert(0, "scan", key.name)
+            frame.insert(1, "sector_deg", key.sector_deg)
+            frame.insert(2, "height_m", np.nan if told.height_m is None else told.height_m)
+            frame["availability"] = means.availability(told.interval_s)
+            frame["time_utc"] = np.datetime_as_string(means.time_utc, unit="s" if period_s % 1 == 0 else "ms")
+            frame.to_csv(
+                path, mode="a", header=not path.exists(), index=False, float_format="%.5f", encoding="utf-8"
+            )
+            rows[period_s] = rows.get(period_s, 0) + len(frame)
+        if path.exists():
+            _copy_to_parquet(path)
+    return rows
 
 
 def write_log(folder: Path, titles: tuple[str, str], found: Retrieved) -> None:
@@ -114,6 +129,10 @@ def write_log(folder: Path, titles: tuple[str, str], found: Retrieved) -> None:
         lines += ["", f"scan {scan}", *(f"  {note}" for note in found.notes[scan])]
         lines.append(f"  measured azimuths less the planned ones: {found.offsets_deg[scan]:+.3f}°")
         lines += [f"  {told(step)}" for step in steps]
+        lines += [f"  no wind: {line}" for line in told_losses(found.lost[scan])]
+        lines += [f"  {line}" for line in (told_drifts(found.drifts[scan]) if scan in found.drifts else ())]
+        if scan in found.alone:
+            lines.append(f"  {ALONE}")
         agreement = found.agreements[scan]
         if any(agreement):
             names = ("both", "usual CNR limits only", "the automatic filter only", "neither")
@@ -122,11 +141,30 @@ def write_log(folder: Path, titles: tuple[str, str], found: Retrieved) -> None:
     for pair, gaps in found.gaps.items():
         lines += ["", f"pair {pair}"]
         lines += [
-            f"  gap up to {gap.gap_s:g} s: {gap.pairs} pairs, {gap.share:.1%} of the rays" for gap in gaps
+            f"  gap up to {gap.gap_s:g} s: {gap.pairs} pairs, {gap.share:.1%} of the rays, {gap.mean_gap_s:.2f} s apart, "
+            f"standard deviation within ten minutes {gap.spread_mps:.3f} m/s"
+            for gap in gaps
         ]
     (folder / "retrieve.log").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    counts = {scan: [step._asdict() for step in steps] for scan, steps in found.steps.items()}
+    counts: dict[str, list[dict[str, object]]] = {
+        scan: [
+            *(step._asdict() for step in steps),
+            *({"no wind": reason, "scans": count} for reason, count in found.lost[scan].items()),
+        ]
+        for scan, steps in found.steps.items()
+    }
     (folder / "filters.json").write_text(json.dumps(counts, ensure_ascii=False, indent=1), encoding="utf-8")
+
+
+def told_losses(lost: Mapping[str, int]) -> list[str]:
+    """Scans without a wind, in words.
+
+    Examples
+    --------
+    >>> told_losses({"fewer rays than unknowns, 4°": 12})
+    ['12 scans: fewer rays than unknowns, 4°']
+    """
+    return [f"{count} scans: {reason}" for reason, count in lost.items()]
 
 
 def told(step: Step) -> str:

@@ -9,10 +9,11 @@ from geometry.arrays import FloatArray
 from planner.fidelity_wind import Air
 from planner.places import Places
 from planner.site import Mast
+from reconstruct.periods import scans_in
 from reconstruct.persistence import split_covariance
+from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
-from reconstruct.retrieval import gain, rows
-from reconstruct.ten_minute import AVERAGING_S, predict_ten_minute
+from reconstruct.ten_minute import predict_ten_minute
 from reconstruct.uncertainty import BudgetEntry, ErrorSources, budget, unknown_sources
 from reconstruct.wind import WindState
 
@@ -50,7 +51,7 @@ def ten_minute_budget(scan: str, target: str, air: Air, mast: Mast | None) -> Bu
     Errors drawn anew in every scan are divided by the number of scans; those that stay do not average out.
     """
     state, rays = air.states[len(air.states) // 2], air.rays
-    scans = int(AVERAGING_S / rays.period_s)
+    scans = scans_in(rays.period_s)
     parts = {
         words: _part(rays, state, [_only(each, name) for each in air.sources], scans)
         for name, words in SOURCES.items()
@@ -92,6 +93,6 @@ def _only(sources: ErrorSources, name: str) -> ErrorSources:
 
 def _part(rays: Rays, state: WindState, sources: Sequence[ErrorSources], scans: int) -> FloatArray:
     """(2, 2) covariance of a ten-minute mean from one source [m²/s²]."""
-    fit = gain(rows(rays.azimuth_deg, rays.elevation_deg))
+    fit = ray_fit(rays).gain
     errors = split_covariance(rays, state, sources)
     return np.asarray(fit @ (np.diag(errors.random_m2s2) / scans + errors.persistent_m2s2) @ fit.T)

@@ -28,6 +28,8 @@ COMMANDS = (
     "report",
     "tradeoff",
     "place",
+    "stay",
+    "share",
     "simulate",
     "retrieve",
     "compare",

@@ -12,14 +12,14 @@ from geometry.beams import beam_to
 from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
-from planner.hard_targets import sought
+from planner.handover.names import file_stem
+from planner.hard_targets import names_of, sought
 from planner.places import Places
-from planner.site import HardTarget, Lidar
+from planner.site import HardTarget, Lidar, Site
 from reconstruct.cnr_map import CnrMap, map_of
 from reconstruct.hard_target import BEAM_WIDTH_M, FoundTarget, find_target
-from reconstruct.mounting_fit import ANGLES, Angle, MountingFit, Sighting, fit_mounting
-
-DRIFT_STDS = 2.0
+from reconstruct.mounting_fit import SIGNIFICANT_CHANCE, MountingFit, fit_mounting
+from reconstruct.sightings import ANGLES, Angle, Sighting
 
 
 class Mapped(NamedTuple):
@@ -45,13 +45,18 @@ class Drift(NamedTuple):
     range_std_m: float
 
     @property
+    def chance(self) -> float:
+        """How often a head that has not moved seems to move as much: chi square of what is known of the three."""
+        from scipy.special import chdtrc
+
+        moved, std = np.array(self[2:5]), np.array(self[5:8])
+        known = np.isfinite(moved) & np.isfinite(std) & (std > 0)
+        return float(chdtrc(known.sum(), ((moved[known] / std[known]) ** 2).sum())) if known.any() else 1.0
+
+    @property
     def is_significant(self) -> bool:
-        """Whether any of the three moved by more than two standard deviations."""
-        return any(
-            abs(moved) > DRIFT_STDS * std
-            for moved, std in zip(self[2:5], self[5:8], strict=True)
-            if np.isfinite(moved) and np.isfinite(std)
-        )
+        """Whether that is under 5 %: three numbers at two standard deviations each would cry wolf in 13 %."""
+        return self.chance < SIGNIFICANT_CHANCE
 
 
 class HeadFit(NamedTuple):
@@ -64,8 +69,8 @@ class HeadFit(NamedTuple):
     drifts: tuple[Drift, ...]
 
 
-def read_maps(named: Sequence[str]) -> list[tuple[str, CnrMap]]:
-    """Read maps given as FILE or TARGET=FILE; a target that is not said is the name of its file.
+def read_maps(named: Sequence[str], site: Site) -> list[tuple[str, CnrMap]]:
+    """Read maps given as FILE or TARGET=FILE; a target that is not said is the one after which its file is called.
 
     Raises
     ------
@@ -74,11 +79,13 @@ def read_maps(named: Sequence[str]) -> list[tuple[str, CnrMap]]:
     """
     from reconstruct.formats.reading import read
 
+    called = {file_stem(name): name for name in names_of(site)}
     maps = []
     for text in named:
         target, equals, file = text.partition("=")
         path = file if equals and not Path(text).exists() else text
-        name = target if path == file and equals else Path(text).name.split(".")[0]
+        stem = Path(text).name.split(".")[0]
+        name = target if path == file and equals else called.get(stem, stem)
         maps.append((name, map_of(read(path))))
     return maps
 
@@ -128,13 +135,23 @@ def fit_head(
     if faults:
         raise InputError("no offsets from these maps:\n  " + "\n  ".join(faults))
     before = places.mounting(chosen)
-    fit = fit_mounting(
-        [item.sighting for item in mapped],
-        start=before,
-        solve=solve,
-        head_std_m=chosen.uncertainty.position_m,
-    )
-    return HeadFit(chosen, before, tuple(mapped), fit, drifts(mapped))
+    moved = drifts(mapped)
+    try:
+        fit = fit_mounting(
+            [item.sighting for item in mapped],
+            start=before,
+            solve=solve,
+            head_std_m=chosen.uncertainty.position_m,
+        )
+    except InputError as error:
+        turned = [item.target for item in moved if item.is_significant]
+        if not turned:
+            raise
+        raise InputError(
+            f"{error}. Between its first and last map {', '.join(turned)} has moved as the head shows it: fit the maps "
+            "of each test by themselves"
+        ) from error
+    return HeadFit(chosen, before, tuple(mapped), fit, moved)
 
 
 def drifts(mapped: Sequence[Mapped]) -> tuple[Drift, ...]:

@@ -1,51 +1,23 @@
 """A CNR map planned: where to scan for a hard target, in which steps and gates, how long, and what else is there."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from geometry.angles import difference_deg, wrap_360_deg
-from geometry.arrays import FloatArray
+from geometry.angles import difference_deg
 from geometry.errors import InputError
 from geometry.gates import Gates, Probe, window_ns
-from geometry.scans import points
+from planner.cnr_window import WINDOW_STDS, Order, Window, windows
 from planner.hard_targets import Expected, Neighbour, candidates, expected, hiding, neighbours, sought
+from planner.over_terrain import target_sight
 from planner.places import Places
-from planner.scan_making import head_limits
 from planner.site import HardTarget, Lidar
+from planner.target_ground import GroundMet, ground_met
 from reconstruct.hard_target import BEAM_WIDTH_M
 from reconstruct.target_choice import Choice, best_targets
 
-Order = Literal["rows", "columns"]
-
-WINDOW_STDS = 3.0  # the target is inside in 99 % of cases with two independent angles
-PER_TARGET = 4.0  # steps across the target
-PER_BEAM = 2.0  # and no more of them than this across the beam
-MARGIN_STEPS = 3.0  # beyond the target's edge, so that it is seen to end
-LEAST_WIDTHS = 4.0  # of the target: most rays must miss, for they tell the background
-FEW = 9  # rows of a mast, columns of a boom: along it there is nothing to find
-
-UNKNOWN_HEADING_DEG = 1.0  # from this uncertainty on one coarse row comes first
-FULL_CIRCLE_STD_DEG = 60.0
-MAX_RAYS = 100_000
 DEFAULT_ACCUMULATION_S = 0.1
 GATE_M = 1.0
-
-
-class Window(NamedTuple):
-    """One raster of a map, in head angles."""
-
-    stage: Literal["coarse", "fine"]
-    azimuth_deg: FloatArray  # (column,) head
-    elevation_deg: FloatArray  # (row,) head
-    order: Order
-    accumulation_s: float
-    time_s: float  # from the first ray to the end of the last
-
-    @property
-    def rays(self) -> tuple[FloatArray, FloatArray]:
-        """(ray,) head azimuth and elevation [deg], one line back, the next forth (serpentine)."""
-        return serpentine(self.azimuth_deg, self.elevation_deg, self.order)
 
 
 class MapPlan(NamedTuple):
@@ -61,6 +33,7 @@ class MapPlan(NamedTuple):
     probe: Probe
     others: tuple[tuple[Neighbour, bool], ...]  # in the window, and whether within the gates too
     hidden_by: tuple[str, ...]
+    ground: GroundMet | None  # where rays of the fine window meet it
     notes: tuple[str, ...]
 
     @property
@@ -124,26 +97,33 @@ def plan_map(
     per_m = float(np.rad2deg(1.0 / reach))
     beam_deg, size_deg = beam_width_m * per_m, sought_target.size_m * per_m
     seconds = accumulation_s or device.min_accumulation_s or DEFAULT_ACCUMULATION_S
-    windows = _windows(chosen, sought_target, seen, beam_deg, size_deg, order, seconds)
+    stages = windows(chosen, sought_target, seen, beam_deg, size_deg, order, seconds)
     probe = map_probe(chosen, pulse_ns, fft_points)
     gates, notes = _gates(chosen, seen, probe)
     around = neighbours(places, chosen)
     carrier = sought_target.on or sought_target.name
-    in_window = [item for item in around if item.name != carrier and _meets(item, seen, windows[-1])]
+    in_window = [item for item in around if item.name != carrier and _meets(item, seen, stages[-1])]
     hidden = tuple(dict.fromkeys(hiding(around, seen.true, carrier=carrier)))
-    if places.site.terrain is not None:
-        notes.append("the terrain is not looked at")
+    sight = target_sight(places, chosen, position)
+    if sight is not None and sight.state == "blocked":
+        hidden = (*hidden, "the terrain")
+    elif sight is not None and sight.state == "unknown":
+        notes.append(
+            "part of the way to it lies outside the height raster: whether the terrain hides it is not known"
+        )
+    ground = ground_met(places, chosen, *stages[-1].rays, gates.last_m + 0.5 * probe.length_m)
     return MapPlan(
         lidar=chosen,
         target=sought_target,
         expected=seen,
         beam_deg=beam_deg,
         size_deg=size_deg,
-        windows=windows,
+        windows=stages,
         gates=gates,
         probe=probe,
         others=tuple((item, _within(item, gates, probe)) for item in in_window),
         hidden_by=hidden,
+        ground=ground,
         notes=tuple(notes),
     )
 
@@ -157,91 +137,6 @@ def choose_targets(places: Places, lidar: str, *, count: int = 3) -> Choice | No
     return best_targets(
         found, count=count, start=places.mounting(chosen), head_std_m=chosen.uncertainty.position_m
     )
-
-
-def serpentine(
-    azimuth_deg: FloatArray, elevation_deg: FloatArray, order: Order
-) -> tuple[FloatArray, FloatArray]:
-    """Rays (ray,) of a raster, every second line in reverse.
-
-    Examples
-    --------
-    >>> azimuth, elevation = serpentine(np.array([1.0, 2.0]), np.array([5.0, 6.0]), "rows")
-    >>> azimuth.tolist(), elevation.tolist()
-    ([1.0, 2.0, 2.0, 1.0], [5.0, 5.0, 6.0, 6.0])
-    """
-    along, lines = (azimuth_deg, elevation_deg) if order == "rows" else (elevation_deg, azimuth_deg)
-    forth = (np.arange(lines.size) % 2 == 0)[:, None]
-    moving = np.where(forth, along, along[::-1]).ravel()
-    fixed = np.repeat(lines, along.size)
-    return (moving, fixed) if order == "rows" else (fixed, moving)
-
-
-def _windows(
-    lidar: Lidar,
-    target: HardTarget,
-    seen: Expected,
-    beam_deg: float,
-    size_deg: float,
-    order: Order,
-    seconds: float,
-) -> tuple[Window, ...]:
-    """The fine window, and a coarse row before it where the heading is not known."""
-    resolution = (lidar.device.head.resolution_deg if lidar.device.head else None) or 0.001
-    step = max(size_deg / PER_TARGET, beam_deg / PER_BEAM, resolution)
-    step = float(np.floor(step / resolution + 1e-9)) * resolution
-    wider = 1.0 / float(np.cos(np.deg2rad(seen.elevation_head_deg)))
-    unsure, windows = seen.azimuth_std_deg, []
-    if unsure > UNKNOWN_HEADING_DEG:
-        row = _coarse(lidar, target, seen, size_deg, wider, seconds)
-        windows.append(row)
-        unsure = float(np.diff(row.azimuth_deg[:2])[0])  # the mast is found to a step of the row
-    across = _line(seen.azimuth_head_deg, unsure, size_deg * wider, step * wider, target.shape == "boom")
-    upward = _line(seen.elevation_head_deg, seen.elevation_std_deg, size_deg, step, target.shape == "mast")
-    if across.size * upward.size > MAX_RAYS:
-        raise InputError(
-            f"a map of {across.size} x {upward.size} rays; allowed: {MAX_RAYS} in all. Level the lidar and find its "
-            "heading better first, or take a larger target"
-        )
-    windows.append(_window(lidar, "fine", across, upward, order, seconds))
-    return tuple(windows)
-
-
-def _line(middle: float, std: float, size: float, step: float, along: bool) -> FloatArray:
-    """Angles of columns or rows [deg]; only a few where the target runs along them."""
-    if along:
-        return np.asarray(middle + step * (np.arange(FEW) - FEW // 2), dtype=np.float64)
-    half = max(WINDOW_STDS * std + 0.5 * size + MARGIN_STEPS * step, 0.5 * LEAST_WIDTHS * size)
-    count = int(np.ceil(half / step))
-    return np.asarray(middle + step * np.arange(-count, count + 1), dtype=np.float64)
-
-
-def _coarse(
-    lidar: Lidar, target: HardTarget, seen: Expected, size_deg: float, wider: float, seconds: float
-) -> Window:
-    """One row that crosses what carries the target, low enough for it to be there whatever the levelling."""
-    step = size_deg * wider
-    below = 0.0 if target.shape == "mast" else WINDOW_STDS * seen.elevation_std_deg + size_deg
-    half = 180.0 if seen.azimuth_std_deg >= FULL_CIRCLE_STD_DEG else WINDOW_STDS * seen.azimuth_std_deg
-    half = min(half, 180.0)
-    count = int(np.ceil(half / step))
-    azimuth = np.asarray(seen.azimuth_head_deg + step * np.arange(-count, count + 1), dtype=np.float64)
-    row = np.array([seen.elevation_head_deg - below])
-    return _window(lidar, "coarse", azimuth, row, "rows", seconds)
-
-
-def _window(
-    lidar: Lidar,
-    stage: Literal["coarse", "fine"],
-    across: FloatArray,
-    upward: FloatArray,
-    order: Order,
-    seconds: float,
-) -> Window:
-    """A raster with its time by the head's kinematics, from rest to rest between rays."""
-    azimuth, elevation = serpentine(across, upward, order)
-    scan = points(azimuth, elevation, accumulation_s=seconds, head=head_limits(lidar), sweep="back_and_forth")
-    return Window(stage, across, upward, order, seconds, scan.sweep_s)
 
 
 def map_probe(lidar: Lidar, pulse_ns: float | None, fft_points: int | None) -> Probe:
@@ -289,22 +184,3 @@ def _meets(item: Neighbour, seen: Expected, window: Window) -> bool:
 def _within(item: Neighbour, gates: Gates, probe: Probe) -> bool:
     """Whether something stands where the gates are, or a probe from there."""
     return gates.first_m - probe.length_m <= item.range_m <= gates.last_m + probe.length_m
-
-
-def window_record(window: Window) -> dict[str, object]:
-    """A window in numbers, for tables and JSON."""
-    steps = [float(np.diff(each[:2])[0]) if each.size > 1 else None for each in window[1:3]]
-    return {
-        "stage": window.stage,
-        "azimuth_head_from_deg": float(wrap_360_deg(window.azimuth_deg[0])),
-        "azimuth_head_to_deg": float(wrap_360_deg(window.azimuth_deg[-1])),
-        "azimuth_step_deg": steps[0],
-        "columns": int(window.azimuth_deg.size),
-        "elevation_head_from_deg": float(window.elevation_deg[0]),
-        "elevation_head_to_deg": float(window.elevation_deg[-1]),
-        "elevation_step_deg": steps[1],
-        "rows": int(window.elevation_deg.size),
-        "order": window.order,
-        "accumulation_s": window.accumulation_s,
-        "time_s": window.time_s,
-    }

@@ -8,8 +8,11 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.crossing import cross, shared_probe_length_m
 from planner.places import Places
+from planner.ray_sets import pair_rays
 from planner.scan_layout import ScanLayout
 from planner.site import Pair
+from reconstruct.ray_fit import ray_rows
+from reconstruct.retrieval import cofactor, condition
 
 # How far along a beam its direction in the site's frame is taken where it does not look at the target.
 NO_TARGET_REACH_M = 1000.0
@@ -50,6 +53,28 @@ class PairCrossing(NamedTuple):
     def worst_aimed(self) -> tuple[str, float]:
         """Lidar whose beam passes the target farther away, and how far [m]."""
         return max((self.lidar1, self.miss1_m), (self.lidar2, self.miss2_m), key=lambda beam: beam[1])
+
+
+class JointFit(NamedTuple):
+    """How well the beams of a pair together tell all three components of the wind apart."""
+
+    pair: str
+    target: str
+    condition: float  # of the rows; inf where they cannot
+    vertical_gain: float  # standard deviation of w for one of each radial speed; NaN where it cannot be told
+
+
+def joint_fits(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[JointFit, ...]:
+    """Fits of the pairs whose vertical wind is retrieved too."""
+    by_name = {layout.name: layout for layout in layouts}
+    found = []
+    for pair in places.site.pairs:
+        if pair.fit_columns == 3:
+            rays = pair_rays(places, tuple(by_name[name] for name in pair.scans), pair.target, columns=3)
+            matrix = ray_rows(rays)
+            gain = float(np.sqrt(cofactor(matrix)[2, 2]))
+            found.append(JointFit(pair.name, pair.target, float(condition(matrix)), gain))
+    return tuple(found)
 
 
 def crossings(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[PairCrossing, ...]:

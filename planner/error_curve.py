@@ -16,8 +16,8 @@ from planner.scan_layout import ScanLayout
 from planner.scan_plans import SectorScan
 from planner.site import Pair, Site
 from planner.wind_climate import turbulence
+from reconstruct.periods import TEN_MINUTES_S, scans_in
 from reconstruct.prediction import Tier
-from reconstruct.ten_minute import AVERAGING_S
 
 SizesFrom = Literal["own", "subset"]
 
@@ -81,8 +81,8 @@ def pair_curve(
     progress: Progress | None = None,
 ) -> ErrorCurve:
     """Predict the error of two or three beams that meet, over the declared directions, else all but the excluded ones."""
-    rays = pair_rays(places, layouts, pair.target)
-    size = Size(None, rays, rays, slice(None), int(AVERAGING_S / rays.period_s))
+    rays = pair_rays(places, layouts, pair.target, columns=pair.fit_columns)
+    size = Size(None, rays, rays, slice(None), scans_in(rays.period_s))
     model = Model.of(places.site, pair.target, excluded, layouts, tier, left_out)
     return _curve(pair.name, None, pair.target, model, [size], progress)
 
@@ -113,7 +113,7 @@ def default_tier(site: Site, left_out: frozenset[str] = frozenset()) -> Tier:
 def _own_size(places: Places, layout: ScanLayout, target: str, size_deg: float) -> Size:
     scan = own_scan(layout, size_deg)
     rays = sector_rays(places, layout, scan, target)
-    return Size(size_deg, rays, rays, slice(None), scan.scans_in(AVERAGING_S))
+    return Size(size_deg, rays, rays, slice(None), scan.scans_in(TEN_MINUTES_S))
 
 
 def _subset_sizes(places: Places, layout: ScanLayout, target: str, wanted: Sequence[float]) -> list[Size]:
@@ -122,7 +122,7 @@ def _subset_sizes(places: Places, layout: ScanLayout, target: str, wanted: Seque
     for size_deg in wanted:
         kept = subset_of(layout, size_deg)
         rays = sector_rays(places, layout, layout.scan.subset(kept), target)
-        sizes.append(Size(size_deg, rays, whole, kept, layout.scan.scans_in(AVERAGING_S)))
+        sizes.append(Size(size_deg, rays, whole, kept, layout.scan.scans_in(TEN_MINUTES_S)))
     return sizes
 
 

@@ -99,7 +99,7 @@ def air_of_scan(places: Places, layout: ScanLayout, scan: Scan, exclusion: Exclu
 
 def air_of_pair(places: Places, pair: Pair, layouts: tuple[ScanLayout, ...], excluded: SectorSet) -> Air:
     """What the size of an effect on a pair is judged with."""
-    rays = pair_rays(places, layouts, pair.target)
+    rays = pair_rays(places, layouts, pair.target, columns=pair.fit_columns)
     return _air(pair.name, places.site, pair.target, excluded, rays, layouts)
 
 

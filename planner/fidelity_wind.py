@@ -10,8 +10,8 @@ from geometry.gates import Probe
 from planner.fidelity import Effect, judged
 from planner.site import Site
 from reconstruct.prediction import predict_linear
+from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
-from reconstruct.retrieval import gain, rows
 from reconstruct.spectra import Turbulence
 from reconstruct.turbulent import predict_turbulent
 from reconstruct.uncertainty import ErrorSources, mean_errors_mps
@@ -72,7 +72,7 @@ def _worst(site: Site, airs: Sequence[Air], name: str, values: Sequence[float | 
 
 
 def _mean_error(air: Air, source: str) -> float:
-    fit = gain(rows(air.rays.azimuth_deg, air.rays.elevation_deg))
+    fit = ray_fit(air.rays).gain
     return max(float(np.linalg.norm(mean_errors_mps(fit, air.rays, state)[source])) for state in air.states)
 
 

@@ -10,9 +10,10 @@ from geometry.arrays import FloatArray
 from geometry.beams import Beam, beam_to
 from geometry.errors import InputError
 from planner.nouns import Position
+from planner.over_terrain import target_sight
 from planner.places import Places
 from planner.site import HardTarget, Lidar, Site
-from reconstruct.mounting_fit import Sighting
+from reconstruct.sightings import Sighting
 
 # How well the place of a thing is taken to be known that is no declared hard target [m], ASSUMED: the top of
 # a mast, and of a turbine (its nacelle, whose height and yaw are not in the site file).
@@ -62,10 +63,13 @@ def sought(site: Site, name: str) -> tuple[HardTarget, Position]:
     for target, position in _undeclared(site):
         if target.name == name:
             return target, position
-    known = [item.name for item in site.hard_targets] + [item.name for item, _ in _undeclared(site)]
-    raise InputError(
-        f"no hard target, mast or turbine is called '{name}'; allowed: {', '.join(known) or 'none is declared'}"
-    )
+    known = ", ".join(names_of(site)) or "none is declared"
+    raise InputError(f"no hard target, mast or turbine is called '{name}'; allowed: {known}")
+
+
+def names_of(site: Site) -> list[str]:
+    """Names of everything that `sought` finds."""
+    return [item.name for item in site.hard_targets] + [item.name for item, _ in _undeclared(site)]
 
 
 def _undeclared(site: Site) -> Iterator[tuple[HardTarget, Position]]:
@@ -154,6 +158,9 @@ def candidates(places: Places, lidar: Lidar) -> list[Sighting]:
         if not (device.min_range_m or 0.0) <= reach <= (device.max_range_m or np.inf):
             continue
         if hiding(fixed, seen.true, carrier=target.on or target.name):
+            continue
+        sight = target_sight(places, lidar, position)
+        if sight is not None and sight.state == "blocked":
             continue
         found.append(
             Sighting(

@@ -16,45 +16,69 @@ from planner.nouns import Count, Name, NonNegative, Noun, Number, Positive
 class Pulse(Noun):
     """One pulse mode."""
 
-    pulse_ns: Positive | None = None  # full width at half maximum
+    pulse_ns: Positive | None = None
+    """Pulse length, full width at half maximum. Without it: 200 ns. E.g. 200"""
     pulse_repetition_hz: Positive
-    fft_points: Count | None = None  # samples of one gate, where the scan does not say
+    """Pulse repetition frequency. E.g. 20000"""
+    fft_points: Count | None = None
+    """Samples of one gate where the scan does not say. Without it: 64. E.g. 64"""
 
 
 class Head(Noun):
     """How fast and how far a head turns."""
 
     azimuth_speed_deg_per_s: Positive
+    """Largest angular speed in azimuth. E.g. 50"""
     elevation_speed_deg_per_s: Positive
+    """Largest angular speed in elevation. E.g. 50"""
     azimuth_acceleration_deg_per_s2: Positive
+    """Largest angular acceleration in azimuth. E.g. 100"""
     elevation_acceleration_deg_per_s2: Positive
+    """Largest angular acceleration in elevation. E.g. 100"""
     elevation_min_deg: Number | None = None
+    """Lowest elevation that the head reaches. Without it: not checked. E.g. -10"""
     elevation_max_deg: Number | None = None
+    """Highest elevation that the head reaches. Without it: not checked. E.g. 190"""
     resolution_deg: Positive | None = None
+    """Smallest step of the head. Without it: 0.001. E.g. 0.001"""
 
 
 class Source(Noun):
     """Where the numbers of some fields come from."""
 
     fields: tuple[str, ...]
+    """Keys whose numbers it is about. E.g. [head]"""
     text: str
+    """Where they come from. E.g. maker's data sheet"""
 
 
 class Instrument(Noun):
-    """A scanning lidar; what is not known is None."""
+    """The numbers of a scanning lidar; what is not known is left out."""
 
     name: Name = "inline"
+    """Name of the instrument, in tables and messages. E.g. my lidar"""
     pulses: tuple[Pulse, ...] = ()
-    default_pulse_ns: Positive | None = None  # default: the first of `pulses`
-    sample_ns: Positive = 4.0  # between two samples of the digitiser
+    """Pulse modes."""
+    default_pulse_ns: Positive | None = None
+    """Pulse where the scan does not say. Without it: the first of `pulses`. E.g. 200"""
+    sample_ns: Positive = 4.0
+    """Time between two samples of the digitiser. E.g. 10"""
     head: Head | None = None
+    """How the head turns. Without it: it turns at any speed, taking no time."""
     max_gates: Count | None = None
-    min_range_m: NonNegative | None = None  # end of the blind zone
+    """Most range gates. Without it: not checked. E.g. 500"""
+    min_range_m: NonNegative | None = None
+    """End of the blind zone. Without it: not checked. E.g. 100"""
     max_range_m: Positive | None = None
+    """Range beyond which nothing is measured. Without it: not checked; `place` takes 6 km. E.g. 6000"""
     min_accumulation_s: Positive | None = None
-    radial_speed_limit_mps: Positive | None = None  # largest speed towards or away
-    radial_speed_noise_mps: NonNegative | None = None  # standard deviation of one radial speed at good signal
+    """Shortest accumulation. Without it: not checked. E.g. 0.1"""
+    radial_speed_limit_mps: Positive | None = None
+    """Largest radial speed toward or away. Without it: 30 m/s where a number is needed. E.g. 30"""
+    radial_speed_noise_mps: NonNegative | None = None
+    """Standard deviation of one radial speed at good signal. Without it: 0.1 m/s. E.g. 0.1"""
     sources: Annotated[tuple[Source, ...], Field(repr=False)] = ()
+    """Where the numbers come from, for the report."""
 
     def pulse(self, pulse_ns: float | None = None) -> Pulse | None:
         """Find the mode of a pulse length (None: the default one); None where there is no such mode."""

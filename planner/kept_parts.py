@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.output import write_bytes
+from planner.pointing_log import NOTHING_KNOWN, Known
 from planner.scan_retrieval import ScanPart
+from reconstruct.attitude import LogMeans
 from reconstruct.automatic_filter import Agreement
 from reconstruct.averaging import PeriodSums
+from reconstruct.beam_means import BeamSums
 from reconstruct.filters import Step
 from reconstruct.pairing import RaySeries
 from reconstruct.records import Records
@@ -26,6 +29,9 @@ class Kept(NamedTuple):
     part: ScanPart
     pending: Records | None  # the last pass, which the next part may go on with
     notes: tuple[str, ...]
+    known: Known = NOTHING_KNOWN  # of the instrument, for the next part
+    log: LogMeans | None = None  # of the attitude
+    unlogged: int = 0  # rays without an attitude while others have one
 
 
 def write_kept(place: Path, mark: str, kept: Kept) -> None:
@@ -48,15 +54,23 @@ def write_kept(place: Path, mark: str, kept: Kept) -> None:
         "agreement": list(part.agreement),
         "offset_deg": part.offset_deg,
         "sums": [list(key) for key in part.sums],
+        "lost": part.lost,
         "instrument": None if kept.pending is None else kept.pending.instrument,
+        "known": kept.known,
+        "unlogged": kept.unlogged,
     }
     arrays: Arrays = {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
+    arrays["gates_m"] = part.gates_m
     arrays |= {f"fast {name}": values for name, values in part.fast.items()}
     arrays |= {f"series {name}": values for name, values in part.series._asdict().items()}
     for number, sums in enumerate(part.sums.values()):
         arrays |= {
             f"sums {number} {field.name}": np.asarray(getattr(sums, field.name)) for field in fields(sums)
         }
+    for period_s, beams in part.beams.items():
+        arrays |= {f"beams {period_s!r} {name}": values for name, values in _numbers_of(beams).items()}
+    if kept.log is not None:
+        arrays |= {f"log {field.name}": getattr(kept.log, field.name) for field in fields(kept.log)}
     if kept.pending is not None:
         rays = kept.pending
         arrays |= {
@@ -81,20 +95,42 @@ def read_kept(place: Path, mark: str) -> Kept | None:
     part = ScanPart(
         fast=_named(arrays, "fast "),
         sums=sums,
+        beams=_beams(arrays),
+        gates_m=arrays["gates_m"],
         series=RaySeries(**_named(arrays, "series ")),
         steps=tuple(Step(*step) for step in head["steps"]),
+        lost=head["lost"],
         agreement=Agreement(*head["agreement"]),
         offset_deg=head["offset_deg"],
     )
     waiting = _named(arrays, "pending ")
     pending = Records(instrument=head["instrument"], **waiting) if waiting else None
-    return Kept(part, pending, tuple(head["notes"]))
+    logged = _named(arrays, "log ")
+    return Kept(
+        part,
+        pending,
+        tuple(head["notes"]),
+        Known(*(None if each is None else tuple(each) for each in head["known"])),
+        LogMeans(**logged) if logged else None,
+        head["unlogged"],
+    )
 
 
 def read_series(place: Path) -> RaySeries:
     """Only the rays at the target of a kept part."""
     with np.load(place, allow_pickle=False) as file:
         return RaySeries(*(file[f"series {name}"] for name in RaySeries._fields))
+
+
+def _numbers_of(beams: BeamSums) -> Arrays:
+    return {field.name: getattr(beams, field.name) for field in fields(beams) if field.name != "period_s"}
+
+
+def _beams(arrays: Arrays) -> dict[float, BeamSums]:
+    periods = {name.split()[1] for name in arrays if name.startswith("beams ")}
+    return {
+        float(text): BeamSums(float(text), **_named(arrays, f"beams {text} ")) for text in sorted(periods)
+    }
 
 
 def _named(arrays: Arrays, start: str) -> dict[str, Any]:

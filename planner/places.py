@@ -14,7 +14,8 @@ from geometry.errors import InputError
 from geometry.frames import EarthModel, SiteFrame
 from geometry.head import Mounting
 from geometry.wakes import Rotors
-from planner.nouns import Position
+from planner.ground import ground_under_m
+from planner.nouns import Position, made_of
 from planner.site import Lidar, Site
 
 
@@ -105,8 +106,9 @@ class Places:
         return self.from_lidar_m(lidar, reach * unit_vector(azimuth_deg, elevation_deg))
 
     def height_above_ground_m(self, target: str) -> float:
-        """Height of a target above the ground [m]; negative below it."""
-        return self.site.target_position_m(target)[2] - self.site.ground_m
+        """Height of a target above the ground under it [m]; negative below it."""
+        position = self.site.target_position_m(target)
+        return position[2] - float(ground_under_m(self.site, position))
 
     @cached_property
     def outside_area_deg(self) -> float | None:
@@ -140,13 +142,12 @@ class Places:
     def mounting(self, lidar: Lidar) -> Mounting:
         """How the lidar's head stands against true north: the convergence turns a zero at grid north."""
         zero_deg = self.convergence_deg(lidar) if lidar.north == "grid" else 0.0
-        return Mounting(
+        return made_of(
+            lidar.mounting,
+            Mounting,
             heading_deg=lidar.mounting.heading_deg + zero_deg,
-            pitch_deg=lidar.mounting.pitch_deg,
-            roll_deg=lidar.mounting.roll_deg,
             azimuth_offset_deg=lidar.azimuth_offset_deg,
             elevation_offset_deg=lidar.elevation_offset_deg,
-            range_offset_m=lidar.mounting.range_offset_m,
         )
 
     @cached_property

@@ -9,10 +9,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from geometry.angles import SectorSet, difference_deg, wrap_180_deg
-from planner.crossings import PairCrossing, crossings
+from planner.crossings import JointFit, PairCrossing, crossings, joint_fits
 from planner.exclusion import Exclusion, Near, exclusions, near_wakes, wanted_directions
 from planner.fidelity import Effect, earth_model, geometric_effects
 from planner.obstruction import Obstruction, obstructions
+from planner.over_terrain import OverTerrain, over_terrain, terrain_obstructions
 from planner.places import Places
 from planner.pointing import Pointing, pointings
 from planner.scan_layout import ScanLayout, lay_out
@@ -73,14 +74,25 @@ class Plan:
         return crossings(self.exact_places, self.layouts)
 
     @cached_property
+    def joint_fits(self) -> tuple[JointFit, ...]:
+        """How well the pairs that retrieve the vertical wind can tell it."""
+        return joint_fits(self.exact_places, self.layouts)
+
+    @cached_property
     def exclusions(self) -> tuple[Exclusion, ...]:
         """What wakes take from every scan at every target."""
         return exclusions(self.places, self.layouts)
 
     @cached_property
     def obstructions(self) -> tuple[Obstruction, ...]:
-        """Everything solid that a ray touches or nearly touches."""
-        return obstructions(self.places, self.layouts)
+        """Everything solid that a ray touches or nearly touches, the ground included."""
+        solid = obstructions(self.places, self.layouts)
+        return (*solid, *terrain_obstructions(self.layout, self.over_terrain))
+
+    @cached_property
+    def over_terrain(self) -> tuple[OverTerrain, ...]:
+        """How the rays of every scan clear the terrain, gate by gate; nothing without one."""
+        return over_terrain(self.exact_places, self.layouts)
 
     @cached_property
     def predicted(self) -> "Predicted":

@@ -11,6 +11,7 @@ from geometry.beams import beam_to
 from geometry.crossing import cross
 from geometry.errors import InputError
 from planner.crossings import PairCrossing, beam_line
+from planner.ground import heights_of
 from planner.obstruction import lost_ranges_m, reach_m
 from planner.palette import EXCLUDED, OBSTACLE, lidar_colour
 from planner.plan import Plan
@@ -34,6 +35,8 @@ ROOM = 0.09  # share of the overview left free on each side, for names at its bo
 RING_LIFT = 0.02  # of the ring's radius: nearer to the ground it flickers in a browser
 WAKE_LIFT_M = 0.5  # wakes end above the ground: two surfaces in one place flicker
 AWAY_NEAR = ("wakes", "excluded", "north and scale")  # layers that would cover the close-up
+HILLS_CELLS = 161  # of the terrain along each side of what is drawn
+HILLS_MARGIN = 0.1  # of the longer side, that is added all round
 MOST_RAYS = 400  # a scan of more is drawn with every so manieth ray
 
 
@@ -55,9 +58,10 @@ def plan_scene(plan: Plan) -> Scene:
     ]
     if not standing:
         raise InputError("the site has nothing to draw: give at least one lidar, mast, turbine or target")
-    ground = layers.ground_layers(standing, height_m=GROUND_M)
+    hills = list(_hills(plan, standing))
+    ground = _ground(standing, hills)
     named = np.stack([label.at_m for layer in standing for label in layer.labels])
-    points = np.concatenate([positions_m(item) for layer in (*standing, ground[2]) for item in layer.items])
+    points = np.concatenate([positions_m(item) for layer in (*standing, ground[-1]) for item in layer.items])
     wind_deg = plan.prevailing_deg
     turned = bool(plan.site.turbines) and bool(np.isfinite(wind_deg))
     side_deg = views.azimuth_of_deg(views.overview(points, named, facing_deg=wind_deg if turned else None))
@@ -71,12 +75,40 @@ def plan_scene(plan: Plan) -> Scene:
         margin=ROOM,
     )
     around = [*_excluded(plan)]
-    drawn = _named_shortly([*ground, *around, *standing])
+    drawn = _named_shortly([*ground, *hills, *around, *standing])
     hidden = tuple(layer.name for layer in drawn if layer.name.startswith(AWAY_NEAR))
     note = f"wakes and rotors in the prevailing wanted wind, from {wind_deg:.0f}°" if turned else ""
     return Scene(
         _short(plan.site.name, 2 * LONGEST), drawn, (overview, *_close_ups(plan, overview, hidden)), note=note
     )
+
+
+def _ground(standing: Sequence[Layer], hills: Sequence[Layer]) -> tuple[Layer, ...]:
+    """Plane, grid, arrow and scale bar; under a terrain the plane lies below it, and the marks above."""
+    if not hills:
+        return layers.ground_layers(standing, height_m=GROUND_M)
+    up = np.concatenate([positions_m(item)[:, 2] for layer in hills for item in layer.items])
+    _, _, marks = layers.ground_layers(standing, height_m=float(up.min()), mark_height_m=float(up.max()))
+    return (marks,)
+
+
+def _hills(plan: Plan, standing: Sequence[Layer]) -> Iterator[Layer]:
+    """The terrain under what stands, with canopy and buildings, on a grid of the local frame."""
+    heights = heights_of(plan.site)
+    if heights is None:
+        return
+    points = np.concatenate([positions_m(item) for layer in standing for item in layer.items])[:, :2]
+    low, high = points.min(axis=0), points.max(axis=0)
+    border = HILLS_MARGIN * float((high - low).max())
+    east, north = (np.linspace(low[i] - border, high[i] + border, HILLS_CELLS) for i in (0, 1))
+    flat = np.stack([*np.meshgrid(east, north), np.zeros((HILLS_CELLS, HILLS_CELLS))], axis=-1)
+    places = plan.exact_places
+    spots = places.frame.projected_m(places.origin_m, flat)
+    spots[..., 2] = heights.top.heights_m(spots[..., 0], spots[..., 1])
+    known = np.isfinite(spots[..., 2])
+    if known.any():
+        up = places.local_m(np.where(known[..., None], spots, places.origin_m))[..., 2]
+        yield layers.terrain_layer(east, north, np.where(known, up, np.nan))
 
 
 def _named_shortly(drawn: Sequence[Layer]) -> tuple[Layer, ...]:

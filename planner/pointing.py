@@ -8,6 +8,7 @@ from geometry.angles import wrap_360_deg
 from geometry.beams import beam_to
 from geometry.earth import refraction_lift_m
 from geometry.errors import InputError
+from planner.over_terrain import State, target_sight
 from planner.places import Places
 from planner.scan_layout import ScanLayout
 from planner.site import Lidar
@@ -29,6 +30,9 @@ class Pointing(NamedTuple):
     convergence_deg: float
     refraction_deg: float  # to add to the elevation: the beam bends down by so much; not in elevation_deg
     scan: str | None
+    terrain: State | None  # whether ground, canopy and buildings leave the way clear; None without terrain
+    terrain_clearance_m: float | None  # above them where the beam passes them nearest as seen from the head
+    terrain_distance_m: float | None  # level, from the head to there
 
 
 def pointings(places: Places, layouts: tuple[ScanLayout, ...]) -> tuple[Pointing, ...]:
@@ -77,6 +81,7 @@ def point(places: Places, lidar: Lidar, target: str, layout: ScanLayout | None) 
     head_azimuth, head_elevation = places.mounting(lidar).to_head(azimuth_deg, elevation_deg)
     convergence_deg = places.convergence_deg(lidar)
     gate = None if layout is None else _gate_around(layout, range_m)
+    sight = target_sight(places, lidar, position)
     return Pointing(
         lidar=lidar.name,
         target=target,
@@ -91,6 +96,9 @@ def point(places: Places, lidar: Lidar, target: str, layout: ScanLayout | None) 
         convergence_deg=convergence_deg,
         refraction_deg=float(np.rad2deg(refraction_lift_m(range_m) / range_m)) if range_m else 0.0,
         scan=None if layout is None else layout.name,
+        terrain=None if sight is None else sight.state,
+        terrain_clearance_m=None if sight is None else sight.clearance_m,
+        terrain_distance_m=None if sight is None else sight.distance_m,
     )
 
 

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.errors import InputError
-from geometry.head import Mounting
 from planner.campaign import Columns, RayInput
 from planner.files.yaml_campaign import PATTERN
+from planner.nouns import made_of
 from planner.places import Places
+from planner.pointing_log import mounting_of, pointed
 from planner.scan_layout import ScanLayout
 from reconstruct.formats.options import ColumnMap, Options
 from reconstruct.formats.reading import detect, read
@@ -29,9 +30,12 @@ class Part(NamedTuple):
     fingerprint: str  # changes when the piece does
     share: float  # of the input that is done with it, 0 to 1
     alone: bool  # nothing else could be read in its place
+    whole: bool  # no pass goes on in the next piece
 
 
-def parts_of(item: RayInput, layout: ScanLayout, places: Places, *, rays: int) -> Iterator[Part]:
+def parts_of(
+    item: RayInput, layout: ScanLayout, places: Places, range_m: float | None, *, rays: int
+) -> Iterator[Part]:
     """The pieces of an input, in order: a file each, or the chunks of a store or database.
 
     Parameters
@@ -39,7 +43,9 @@ def parts_of(item: RayInput, layout: ScanLayout, places: Places, *, rays: int) -
     item
         Where the rays are.
     layout, places
-        Of its scan: a store gives the gate that is wanted alone.
+        Of its scan.
+    range_m
+        True range of the gate that is wanted [m]: a store gives it alone. None: every gate.
     rays
         Of a store or database that are read at once.
 
@@ -48,59 +54,50 @@ def parts_of(item: RayInput, layout: ScanLayout, places: Places, *, rays: int) -
     InputError
         If there is nothing to read.
     """
+    head_m = None if range_m is None else float(mounting_of(item, layout, places).head_range_m(range_m))
     if item.url is not None:
-        yield from _chunked(_database(item.url, item, rays))
+        yield from _chunked(_database(item.url, item, rays, head_m))
         return
     paths = _files(str(item.path))
     for number, path in enumerate(paths):
         kind = detect(path) if item.kind == "auto" else item.kind
         if kind == "database":
-            yield from _chunked(_database(path, item, rays))
+            yield from _chunked(_database(path, item, rays, head_m))
         elif kind == "store":
-            yield from _chunked(_store(path, item, _wanted_head_range_m(item, layout, places), rays))
+            yield from _chunked(_store(path, item, head_m, rays))
         elif kind != "companion":
             stat = path.stat()
             mark = f"{path.name} {stat.st_size} {stat.st_mtime_ns}"
             load = _loader(path, item)
-            yield Part(load, mark, (number + 1) / len(paths), len(paths) == 1)
+            yield Part(load, mark, (number + 1) / len(paths), len(paths) == 1, False)
 
 
-def at_gate(records: Records, item: RayInput, layout: ScanLayout, places: Places) -> Records:
-    """One gate of the records, with angles from true north and the horizontal, and the clock set right."""
-    seconds = item.offsets.clock_s
-    if seconds:
-        moved = records.time_utc + np.timedelta64(round(seconds * 1e9), "ns")
-        records = replace(records, time_utc=moved, notes=(*records.notes, f"clock moved by {seconds:g} s"))
-    records = records.mounted(_mounting(item, layout, places))
-    gate = records.gate_at(_wanted_m(item, layout))
+def at_gate(
+    records: Records, item: RayInput, layout: ScanLayout, places: Places, range_m: float | None
+) -> Records:
+    """The gate at a true range, with angles from true north and the horizontal, and the clock set right.
+
+    Without a range every gate is left. A nearest gate that is far away is told in the notes.
+    """
+    return gate_of(pointed(records, item, layout, places).records, layout, range_m)
+
+
+def gate_of(records: Records, layout: ScanLayout, range_m: float | None) -> Records:
+    """The gate nearest to a true range, or all of them; a nearest gate that is far away is told in the notes."""
+    if range_m is None:
+        return records
+    gate = records.gate_at(range_m)
+    off_m = float(records.range_m[gate]) - range_m
+    if abs(off_m) > _far_m(records, layout):
+        told = f"the nearest gate is at {records.range_m[gate]:.1f} m, {off_m:+.1f} m from the one that is wanted"
+        records = replace(records, notes=(*records.notes, told))
     return records.at_gates(slice(gate, gate + 1))
 
 
-def _wanted_m(item: RayInput, layout: ScanLayout) -> float:
-    """True range of the gate that is wanted [m]."""
-    wanted_m = item.gate_m or layout.target_range_m
-    if wanted_m is None:
-        raise InputError(
-            f"scan '{layout.name}' has no target: give its input's gate_m, the range that is wanted"
-        )
-    return wanted_m
-
-
-def _wanted_head_range_m(item: RayInput, layout: ScanLayout, places: Places) -> float:
-    """The same as the instrument states it."""
-    return float(_mounting(item, layout, places).head_range_m(_wanted_m(item, layout)))
-
-
-def _mounting(item: RayInput, layout: ScanLayout, places: Places) -> Mounting:
-    """The site's mounting with the input's own offsets on top; of true angles the offsets alone."""
-    stands = places.mounting(layout.lidar) if item.angles == "head" else Mounting()
-    more = item.offsets
-    return replace(
-        stands,
-        azimuth_offset_deg=stands.azimuth_offset_deg + more.azimuth_deg,
-        elevation_offset_deg=stands.elevation_offset_deg + more.elevation_deg,
-        range_offset_m=stands.range_offset_m + more.range_m,
-    )
+def _far_m(records: Records, layout: ScanLayout) -> float:
+    """Half the spacing of the gates, or half a probe: beyond it another piece of air is measured [m]."""
+    spacing_m = float(np.median(np.diff(records.range_m))) if records.gates > 1 else 0.0
+    return max(spacing_m, layout.probe.length_m) / 2 + 1e-6
 
 
 def _files(name: str) -> list[Path]:
@@ -125,39 +122,27 @@ def _loader(path: Path, item: RayInput) -> Callable[[], Records]:
 
 
 def _options(item: RayInput, scenario: int | None = None) -> Options:
-    return Options(
-        instrument=item.instrument,
-        stamp=item.stamp,
-        azimuth=item.azimuth,
-        columns=None if item.columns is None else _column_map(item.columns),
-        scenario=scenario,
-    )
+    columns = None if item.columns is None else _column_map(item.columns)
+    return made_of(item, Options, columns=columns, scenario=scenario)
 
 
 def _column_map(columns: Columns) -> ColumnMap:
     own = {name: name for name in OWN_COLUMNS if name not in columns.constants}
-    return ColumnMap(
-        names=own | columns.names,
-        speed_positive=columns.speed_positive,
-        separator=columns.separator,
-        decimal=columns.decimal,
-        time_unit=columns.time_unit,
-        factors=columns.factors,
-        constants=columns.constants,
-    )
+    return made_of(columns, ColumnMap, names=own | columns.names)
 
 
-def _database(place: str | Path, item: RayInput, rays: int) -> Iterator[Records]:
-    from reconstruct.formats.aas_database import aas_chunks
+def _database(place: str | Path, item: RayInput, rays: int, range_m: float | None) -> Iterator[Records]:
+    from reconstruct.formats.aas_database import CHUNK_RAYS, aas_chunks
 
     known = (
         os.path.expandvars(place) if isinstance(place, str) else place
     )  # a password need not stand in the file
     for scenario in item.scenarios or (None,):
-        yield from aas_chunks(known, _options(item, scenario), rays=rays)
+        fetched = rays if range_m is not None else min(rays, CHUNK_RAYS)
+        yield from aas_chunks(known, _options(item, scenario), rays=fetched, range_m=range_m)
 
 
-def _store(path: Path, item: RayInput, range_m: float, rays: int) -> Iterator[Records]:
+def _store(path: Path, item: RayInput, range_m: float | None, rays: int) -> Iterator[Records]:
     from reconstruct.store import store_chunks
 
     yield from store_chunks(path, instrument=item.instrument, range_m=range_m, values=rays)
@@ -168,4 +153,4 @@ def _chunked(chunks: Iterator[Records]) -> Iterator[Part]:
     for number, chunk in enumerate(chunks):
         ends = f"{chunk.time_utc[0]} {chunk.time_utc[-1]}" if chunk.rays else ""
         mark = f"{chunk.rays} {chunk.gates} {ends} {np.nansum(chunk.radial_speed_mps)!r}"
-        yield Part(lambda chunk=chunk: chunk, mark, 1 - 1 / (number + 2), False)  # type: ignore[misc]
+        yield Part(lambda chunk=chunk: chunk, mark, 1 - 1 / (number + 2), False, True)  # type: ignore[misc]

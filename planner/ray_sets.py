@@ -1,5 +1,7 @@
 """The rays of one retrieval at a target, as the reconstruction wants them: seen from the target."""
 
+from typing import Literal
+
 import numpy as np
 
 from geometry.arrays import FloatArray
@@ -53,7 +55,9 @@ def sector_rays(places: Places, layout: ScanLayout, scan: Scan, target: str) -> 
     )
 
 
-def pair_rays(places: Places, layouts: tuple[ScanLayout, ...], target: str) -> Rays:
+def pair_rays(
+    places: Places, layouts: tuple[ScanLayout, ...], target: str, *, columns: Literal[2, 3] = 2
+) -> Rays:
     """One ray of each scan of a pair, at the same time, at the gate nearest to their common target.
 
     One retrieval lasts as long as the slowest of the scans.
@@ -66,6 +70,8 @@ def pair_rays(places: Places, layouts: tuple[ScanLayout, ...], target: str) -> R
         The scans of the pair, two or more.
     target
         Their common target.
+    columns
+        Of the fit: 2 for u and v, 3 for w too.
 
     Returns
     -------
@@ -86,6 +92,7 @@ def pair_rays(places: Places, layouts: tuple[ScanLayout, ...], target: str) -> R
         swept_azimuth_deg=np.zeros(count),
         probes=tuple(layout.probe for layout in layouts),
         period_s=max(layout.scan.period_s for layout in layouts),
+        columns=columns,
     )
 
 

@@ -48,6 +48,7 @@ from planner.report_tables import (
     pointing_table,
     scan_table,
     size_table,
+    terrain_table,
     unknown_numbers,
     wake_table,
 )
@@ -110,6 +111,7 @@ class SiteReport:
             fidelity_table(self.plan.fidelity),
             position_table(self.plan),
             wind_table(self.plan),
+            terrain_table(self.plan),
         )
         return {table.name: table for table in made}
 
@@ -130,7 +132,8 @@ class SiteReport:
         return {"map": site_map(self.plan), "rose": wake_rose(self.plan), **_scene_part(self)}
 
 
-CSV_TABLES = ("pointing", "findings", "wakes", "crossings", "errors")
+CSV_TABLES = ("pointing", "findings", "wakes", "crossings", "errors", "terrain")
+OF_TERRAIN = ("terrain",)  # written only where a site has one
 
 
 def write_report(
@@ -178,7 +181,9 @@ def write_report(
         for report in reports:
             progress(f"{report.plan.site.name}: figures and scene")
             report.draw()  # while the errors are predicted
-        texts = {f"{name}.csv": _csv(reports, name) for name in CSV_TABLES}
+        hilly = any(report.plan.site.terrain is not None for report in reports)
+        names = [name for name in CSV_TABLES if hilly or name not in OF_TERRAIN]
+        texts = {f"{name}.csv": _csv(reports, name) for name in names}
         texts = {PAGE: _page(reports, progress), **texts}
         for name, text in texts.items():
             (staging / name).write_text(text, encoding="utf-8")

@@ -8,8 +8,9 @@ from planner.error_entry import Entry, rays_lost
 from planner.finding import SEVERITIES, Finding
 from planner.plan import Plan
 from planner.report_errors import recommended_size
-from planner.report_tables import TEN_MINUTES_S, directions
+from planner.report_tables import directions
 from planner.report_values import DASH, fixed, percent
+from reconstruct.periods import TEN_MINUTES_S
 
 WORDS = {"error": ("error", "errors"), "warning": ("warning", "warnings"), "info": ("remark", "remarks")}
 

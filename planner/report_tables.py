@@ -12,11 +12,12 @@ from planner.error_entry import rays_lost
 from planner.exclusion import DEFICIT_STEP_DEG, Exclusion
 from planner.fidelity import Effect
 from planner.finding import Finding
+from planner.over_terrain import OverTerrain
 from planner.plan import Plan
 from planner.report_values import Column, Table, Value, percent, quantity, spans
 from planner.scan_layout import ScanLayout
+from reconstruct.periods import TEN_MINUTES_S
 
-TEN_MINUTES_S = 600.0
 PARALLEL_RANGE_M = 1e6  # beams that come closest farther off than this are as good as parallel
 
 FINDINGS = (
@@ -43,6 +44,22 @@ POINTING = (
     Column("gate_centre_m", "gate centre", "m", 1),
     Column("convergence_deg", "convergence", "°", 3, signed=True),
     Column("refraction_deg", "refraction", "°", 4, signed=True),
+)
+
+POINTING_TERRAIN = (
+    Column("terrain", "terrain"),
+    Column("terrain_clearance_m", "clear by", "m", 1),
+    Column("terrain_distance_m", "at", "m", 0),
+)
+
+TERRAIN = (
+    Column("scan", "scan"),
+    Column("ray", "ray", "", 0),
+    Column("azimuth_true_deg", "azimuth, true north", "°", 3),
+    Column("elevation_deg", "elevation", "°", 3),
+    Column("range_m", "range", "m", 1),
+    Column("terrain", "terrain"),
+    Column("clearance_m", "least height above it on the way", "m", 2),
 )
 
 CROSSINGS = (
@@ -150,8 +167,29 @@ ERRORS = (
 def pointing_table(plan: Plan) -> Table:
     """Where every lidar points for every target."""
     given = plan.pointings if plan.site.lidars and plan.site.targets else ()
-    rows = tuple(tuple(getattr(row, column.key) for column in POINTING) for row in given)
-    return Table("pointing", "Where each lidar points for each target", POINTING, rows)
+    hilly = plan.site.terrain is not None
+    columns = (*POINTING, *(column._replace(on_page=hilly) for column in POINTING_TERRAIN))
+    rows = tuple(tuple(getattr(row, column.key) for column in columns) for row in given)
+    return Table("pointing", "Where each lidar points for each target", columns, rows)
+
+
+def terrain_table(plan: Plan) -> Table:
+    """Every ray and gate over the terrain: blocked, clear or unknown, and its clearance; empty without a terrain."""
+    rows = tuple(row for sight in plan.over_terrain for row in _terrain_rows(plan, sight))
+    return Table("terrain", "Every ray and gate over the terrain", TERRAIN, rows)
+
+
+def _terrain_rows(plan: Plan, sight: OverTerrain) -> Iterator[tuple[Value, ...]]:
+    scan = plan.layout[sight.scan].scan
+    for ray, gate in np.ndindex(*sight.blocked.shape):
+        blocked, unknown = sight.blocked[ray, gate], sight.unknown[ray, gate]
+        clearance_m = float(sight.clearance_m[ray, gate])
+        yield (
+            *(sight.scan, int(ray) + 1, float(scan.azimuth_deg[ray]), float(scan.elevation_deg[ray])),
+            float(sight.range_m[ray, gate]),
+            "blocked" if blocked else "unknown" if unknown else "clear",
+            clearance_m if np.isfinite(clearance_m) else None,
+        )
 
 
 def crossing_table(plan: Plan) -> Table:

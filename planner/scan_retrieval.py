@@ -1,21 +1,16 @@
 """One part of the measured rays of one scan: filtered, cut into scans and sizes, retrieved, summed."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from geometry.angles import difference_deg
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import InputError
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from planner.campaign import CNR_DB, Campaign, Filters
-from planner.error_curve import default_sizes
-from planner.places import Places
-from planner.ray_sets import sector_rays, subset_of
-from planner.scan_layout import ScanLayout
+from planner.scan_jobs import ScanJob, Size, gridded
 from reconstruct.automatic_filter import Agreement, Window, compare_filters, filter_outliers
 from reconstruct.averaging import PeriodSums, TimeArray, period_sums
+from reconstruct.beam_means import BeamSums, along_beam_mps, beam_sums
 from reconstruct.filters import (
     OPEN,
     Filtered,
@@ -28,126 +23,157 @@ from reconstruct.filters import (
 )
 from reconstruct.pairing import RaySeries
 from reconstruct.records import Records
-from reconstruct.retrieval import Retrieval
-from reconstruct.scan_grid import ScanGrid, scan_grid
+from reconstruct.retrieval import REASONS, Retrieval
+from reconstruct.scan_grid import ScanGrid
 from reconstruct.sector_scan import sector_wind
 from reconstruct.wind import from_deg, speed_mps
 
 LEAST_WINDOW_SCANS = 10  # a median and its deviation of fewer are hardly robust
 
 
-class Size(NamedTuple):
-    """A sector size and the columns of the whole scan that stand for it; a stare has one without a size."""
-
-    sector_deg: float
-    rays: slice
-
-
-class ScanJob(NamedTuple):
-    """What every part of a scan is worked on with."""
-
-    layout: ScanLayout
-    planned_azimuth_deg: FloatArray  # (ray,) clockwise, at the lidar
-    step_deg: float
-    turn_deg: float  # from north at the lidar to north at the target
-    raise_deg: float  # the same of the horizontal
-    target_column: int  # the ray that looks at the target
-    sizes: tuple[Size, ...]  # none for a stare
-
-
 class ScanPart(NamedTuple):
     """What one part gave."""
 
-    fast: dict[str, FloatArray | TimeArray]  # one row a scan and size
+    fast: dict[str, FloatArray | TimeArray]  # one row a scan and size; `status` says why a wind is not known
     sums: dict[tuple[float, float], PeriodSums]  # by size and period
+    beams: dict[float, BeamSums]  # by period: radial speeds of what is no fan; cell = ray * gates + gate
+    gates_m: FloatArray  # (gate,) true ranges of a grid's gates
     series: RaySeries  # rays at the target, for pairs
     steps: tuple[Step, ...]
+    lost: dict[str, int]  # scans without a wind, by reason and size
     agreement: Agreement
     offset_deg: float
 
 
-def job_of(layout: ScanLayout, places: Places, sizes_deg: Sequence[float] | None) -> ScanJob:
-    """Prepare the retrieval of a scan.
-
-    Raises
-    ------
-    InputError
-        If the scan has no target, cannot be cut into scans, or a size is not one of its own.
-    """
-    spec = layout.spec
-    if not layout.targets or spec.type not in ("sector", "ppi", "stare"):
-        raise InputError(
-            f"scan '{layout.name}' is a {spec.type} {'with' if layout.targets else 'without'} a target: "
-            "a sector, ppi or stare with a target can be retrieved"
-        )
-    target = layout.targets[0]
-    rays = sector_rays(places, layout, layout.scan, target)
-    azimuth = layout.scan.azimuth_deg
-    off = np.abs(np.asarray(difference_deg(azimuth, float(layout.aim.azimuth_deg[0]))))
-    sizes: tuple[Size, ...] = ()
-    if spec.type == "sector":
-        wanted = sorted(sizes_deg or default_sizes(layout), reverse=True)
-        sizes = tuple(Size(float(size), subset_of(layout, size)) for size in wanted)
-    elif spec.type == "ppi":
-        sizes = (Size(360.0, slice(0, layout.scan.count)),)
-    return ScanJob(
-        layout=layout,
-        planned_azimuth_deg=azimuth,
-        step_deg=360.0 if spec.type == "stare" else spec.step_deg,
-        turn_deg=float(np.mean(np.asarray(difference_deg(rays.azimuth_deg, azimuth)))),
-        raise_deg=float(np.mean(rays.elevation_deg - layout.scan.elevation_deg)),
-        target_column=int(np.argmin(off)),
-        sizes=sizes,
-    )
-
-
 def retrieve_part(records: Records, job: ScanJob, campaign: Campaign) -> ScanPart:
-    """Work on one part: whole passes of one gate, with true angles.
+    """Work on one part: whole passes, with true angles.
 
     Parameters
     ----------
     records
-        With one gate.
+        With one gate; of a grid with all that there are.
     job
         The scan.
     campaign
-        Filters, averaging, columns of the fit.
+        Filters, averaging.
     """
-    if job.layout.scan.count == 1:  # every ray of a stare is a pass
-        records = replace(records, sweep_id=np.arange(records.rays))
-    gridded = scan_grid(records, job.planned_azimuth_deg, step_deg=job.step_deg)
-    grid = gridded.grid
+    if job.kind == "grid":
+        return _grid_part(records, job, campaign)
+    found = gridded(records, job)
+    grid = found.grid
     filtered, steps, agreement = filter_rays(grid, campaign.filters, period_s=job.layout.scan.period_s)
-    series = _series(grid, filtered, job)
-    steps = (gridded.step, *steps)
+    part = empty_part()._replace(
+        series=_series(grid, filtered, job),
+        steps=(found.step, *steps),
+        agreement=agreement,
+        offset_deg=found.offset_deg,
+    )
+    return _fan_part(part, grid, filtered, job, campaign) if job.sizes else _beam_part(part, campaign)
+
+
+def _fan_part(
+    part: ScanPart, grid: ScanGrid, filtered: FloatArray, job: ScanJob, campaign: Campaign
+) -> ScanPart:
+    """The winds of a fan, of every size, and their sums."""
+    whole = partial_scans(filtered, ray_share=campaign.filters.ray_share)
+    steps, lost = [*part.steps, whole.step], dict[str, int]()
     fast: list[dict[str, FloatArray | TimeArray]] = []
     sums: dict[tuple[float, float], PeriodSums] = {}
-    if job.sizes:
-        whole = partial_scans(filtered, ray_share=campaign.filters.ray_share)
-        steps = (*steps, whole.step)
-        for size in job.sizes:
-            table, step = _fit(grid, whole.values, size, job, campaign)
-            steps = (*steps, step) if judges_fit(campaign.filters) else steps
-            fast.append(table)
-            sums |= {
-                (size.sector_deg, period_s): period_sums(
-                    np.asarray(table["time_utc"]).astype("datetime64[ns]"),
-                    np.asarray(table["u_mps"], dtype=float),
-                    np.asarray(table["v_mps"], dtype=float),
-                    period_s=period_s,
-                    shift_s=campaign.averaging.time_shift_s,
-                )
-                for period_s in periods_of(campaign)
-            }
-    together = {name: np.concatenate([table[name] for table in fast]) for name in fast[0]} if fast else {}
-    return ScanPart(together, sums, series, steps, agreement, gridded.offset_deg)
+    for size in job.sizes:
+        table, step, unknown = _fit(grid, whole.values, size, job, campaign)
+        if judges_fit(campaign.filters):
+            steps.append(step)
+        lost |= {f"{reason}, {size.sector_deg:g}°": count for reason, count in unknown.items()}
+        fast.append(table)
+        sums |= {
+            (size.sector_deg, period_s): period_sums(
+                np.asarray(table["time_utc"]).astype("datetime64[ns]"),
+                np.asarray(table["u_mps"], dtype=float),
+                np.asarray(table["v_mps"], dtype=float),
+                w_mps=np.asarray(table["w_mps"], dtype=float) if "w_mps" in table else None,
+                period_s=period_s,
+                shift_s=campaign.averaging.time_shift_s,
+            )
+            for period_s in periods_of(campaign)
+        }
+    together = {name: np.concatenate([table[name] for table in fast]) for name in fast[0]}
+    return part._replace(fast=together, sums=sums, steps=tuple(steps), lost=lost)
+
+
+def _beam_part(part: ScanPart, campaign: Campaign) -> ScanPart:
+    """What one beam gives: its radial speeds, a wind that is not known with the reason, and their sums."""
+    rays = part.series.at(np.isfinite(part.series.radial_speed_mps))
+    fit = sector_wind(rays.azimuth_deg[:, None], rays.elevation_deg[:, None], rays.radial_speed_mps[:, None])
+    table = wind_table(rays.time_utc, fit, float("nan"), np.ones(len(fit.rays), dtype=bool))
+    table |= {
+        "azimuth_deg": rays.azimuth_deg,
+        "elevation_deg": rays.elevation_deg,
+        "radial_speed_mps": rays.radial_speed_mps,
+        "along_beam_mps": along_beam_mps(rays.radial_speed_mps, rays.elevation_deg),
+    }
+    cell = np.zeros(len(rays.time_utc), dtype=np.intp)
+    beams = _beam_sums(rays.time_utc, cell, rays.radial_speed_mps, campaign)
+    return part._replace(fast=table, beams=beams, lost=fit.lost)
+
+
+def _grid_part(records: Records, job: ScanJob, campaign: Campaign) -> ScanPart:
+    """Radial speeds of a slice or raster at every gate; at the gate of the target, if there is one, as a beam."""
+    part, samples = empty_part(), []
+    at_target = None if job.target_m is None else records.gate_at(job.target_m)
+    for gate in range(records.gates):
+        found = gridded(records.at_gates(slice(gate, gate + 1)), job)
+        grid = found.grid
+        filtered, steps, agreement = filter_rays(grid, campaign.filters, period_s=job.layout.scan.period_s)
+        rays = np.broadcast_to(np.arange(filtered.shape[1]), filtered.shape)
+        known = np.isfinite(filtered)
+        samples.append((grid.time_utc[known], rays[known] * records.gates + gate, filtered[known]))
+        part = part._replace(
+            steps=add_steps(part.steps, (found.step, *steps)),
+            agreement=Agreement(*(a + b for a, b in zip(part.agreement, agreement, strict=True))),
+            offset_deg=found.offset_deg,
+        )
+        if gate == at_target:
+            part = part._replace(series=_series(grid, filtered, job))
+    if at_target is not None:
+        part = _beam_part(part, campaign)
+    time, cell, speed = (np.concatenate(each) for each in zip(*samples, strict=True))
+    return part._replace(beams=_beam_sums(time, cell, speed, campaign), gates_m=records.range_m)
+
+
+def _beam_sums(
+    time_utc: TimeArray, cell: IntArray, radial_speed_mps: FloatArray, campaign: Campaign
+) -> dict[float, BeamSums]:
+    return {
+        period_s: beam_sums(
+            time_utc,
+            cell,
+            radial_speed_mps,
+            period_s=period_s,
+            shift_s=campaign.averaging.time_shift_s,
+        )
+        for period_s in periods_of(campaign)
+    }
+
+
+def add_steps(first: Sequence[Step], more: Sequence[Step]) -> tuple[Step, ...]:
+    """Steps of one name as one, in their order.
+
+    Examples
+    --------
+    >>> add_steps([Step("CNR", 10, 9)], [Step("CNR", 5, 5), Step("mine", 1, 1)])
+    (Step(name='CNR', before=15, after=14, unit='rays'), Step(name='mine', before=1, after=1, unit='rays'))
+    """
+    found: dict[str, Step] = {}
+    for step in (*first, *more):
+        found[step.name] = found[step.name] + step if step.name in found else step
+    return tuple(found.values())
 
 
 def empty_part() -> ScanPart:
     """What a part without any ray gives."""
     nothing = np.empty(0)
     series = RaySeries(np.empty(0, dtype="datetime64[ns]"), nothing, nothing, nothing)
-    return ScanPart({}, {}, series, (), Agreement(0, 0, 0, 0), 0.0)
+    return ScanPart({}, {}, {}, nothing, series, (), {}, Agreement(0, 0, 0, 0), 0.0)
 
 
 def filter_rays(
@@ -212,7 +238,7 @@ def periods_of(campaign: Campaign) -> tuple[float, ...]:
 
 def _series(grid: ScanGrid, speed: FloatArray, job: ScanJob) -> RaySeries:
     """The rays that look at the target, with angles as the target sees them."""
-    column = job.target_column
+    column = 0 if job.rays_stand_alone or job.target_column is None else job.target_column
     known = ~np.isnat(grid.time_utc[:, column])
     rays = RaySeries(
         grid.time_utc[known, column],
@@ -225,11 +251,11 @@ def _series(grid: ScanGrid, speed: FloatArray, job: ScanJob) -> RaySeries:
 
 def _fit(
     grid: ScanGrid, speed: FloatArray, size: Size, job: ScanJob, campaign: Campaign
-) -> tuple[dict[str, FloatArray | TimeArray], Step]:
-    """Winds of the scans of one size: one row a scan that had any ray."""
+) -> tuple[dict[str, FloatArray | TimeArray], Step, dict[str, int]]:
+    """Winds of the scans of one size: one row a scan that had any ray, and how many have no wind, by reason."""
     azimuth, elevation = (part[..., size.rays] for part in grid.geometry)
     speed = speed[:, size.rays]
-    fit = sector_wind(azimuth + job.turn_deg, elevation + job.raise_deg, speed, columns=campaign.columns)
+    fit = sector_wind(azimuth + job.turn_deg, elevation + job.raise_deg, speed, columns=job.columns)
     filters = campaign.filters
     good = goodness(fit, speed, noise_mps=filters.noise_mps)
     kept = limit_goodness(
@@ -239,11 +265,15 @@ def _fit(
         r_squared=filters.r_squared,
         reduced_chi2=filters.reduced_chi2,
     )
-    left = np.isfinite(kept.values)
+    unknown = (fit.status > 0) & (fit.rays > 0)
+    left = np.isfinite(kept.values) | unknown
     table = wind_table(grid.middle_utc, fit, size.sector_deg, left)
     table |= {"r_squared": good.r_squared[left], "reduced_chi2": good.reduced_chi2[left]}
     name = f"{kept.step.name}, {size.sector_deg:g}°"
-    return table, kept.step._replace(name=name)
+    reasons = {
+        REASONS[status]: int(count) for status, count in enumerate(np.bincount(fit.status[unknown])) if count
+    }
+    return table, kept.step._replace(name=name), reasons
 
 
 def wind_table(
@@ -271,4 +301,5 @@ def wind_table(
         "uu_m2s2": covariance[:, 0, 0],
         "uv_m2s2": covariance[:, 0, 1],
         "vv_m2s2": covariance[:, 1, 1],
+        "status": fit.status[left].astype(float),
     }

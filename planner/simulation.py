@@ -10,6 +10,7 @@ from geometry.angles import SectorSet
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from planner.exclusion import wanted_directions
+from planner.ground import ground_under_m
 from planner.plan import Plan
 from planner.ray_sets import sector_rays
 from planner.scan_layout import ScanLayout
@@ -190,8 +191,8 @@ def _virtual_scan(plan: Plan, layout: ScanLayout, reference: str) -> VirtualScan
     site, places = plan.site, plan.places
     target = layout.targets[0]
     here, there = (np.array(site.target_position_m(name)) for name in (target, reference))
-    height_m = here[2] - site.ground_m
-    ratio = _growth(site, height_m) / _growth(site, float(there[2] - site.ground_m))
+    height_m = here[2] - float(ground_under_m(site, here))
+    ratio = _growth(site, height_m) / _growth(site, float(there[2] - ground_under_m(site, there)))
     noise_mps = ray_noise(site, layout, target).noise_mps
     return VirtualScan(
         rays=sector_rays(places, layout, layout.scan, target),

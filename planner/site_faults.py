@@ -97,6 +97,8 @@ def _pairs(raw: Raw) -> Iterator[Fault]:
     }
     for index, item in entries(raw, "pairs"):
         names = item.get("scans")
+        if item.get("columns") == 3 and isinstance(names, list | tuple) and len(names) < 3:
+            yield Fault(("pairs", index, "columns"), 3, "3 (u, v and w) only with three scans or more")
         taken: dict[str, str] = {}
         seen: set[str] = set()
         for place, name in enumerate(names if isinstance(names, list | tuple) else ()):

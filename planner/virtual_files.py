@@ -105,7 +105,7 @@ def write_virtual(
 def campaign_text(plan: Plan, inputs: Mapping[str, str]) -> str:
     """The campaign file that goes with the data; `inputs` tells of each scan where its rays are."""
     listed = "\n".join(f"  - {{scan: {_quoted(name)}, {told}}}" for name, told in inputs.items())
-    pairs = [pair for pair in plan.site.pairs if len(pair.scans) == 2 and set(pair.scans) <= set(inputs)]
+    pairs = [pair for pair in plan.site.pairs if set(pair.scans) <= set(inputs)]
     lines = [
         "# A virtual campaign: `lidarplan retrieve` this file, then `lidarplan compare` it.",
         f"name: {_quoted(plan.site.name)}",
@@ -136,7 +136,7 @@ class _RayWriter:
 
     def write(self, scan: str, records: Records) -> None:
         """Write the rays of one scan and day."""
-        from reconstruct.formats.cf_write import write_netcdf
+        from reconstruct.formats.own_netcdf import write_netcdf
         from reconstruct.formats.windscanner_write import write_windscanner
         from reconstruct.record_tables import to_long, write_parquet
         from reconstruct.store import write_store

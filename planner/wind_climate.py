@@ -8,6 +8,8 @@ from geometry.angles import SectorSet
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from planner.exclusion import wanted_directions
+from planner.ground import ground_under_m
+from planner.nouns import made_of
 from planner.site import Lidar, Site
 from planner.wind_rose import load_rose
 from reconstruct.climate import DIRECTIONS, SPEEDS, Climate, listed_climate, rose_climate, weibull_climate
@@ -100,10 +102,12 @@ def height_above_ground_m(site: Site, target: str) -> float:
     InputError
         If it is not above the ground.
     """
-    height_m = site.target_position_m(target)[2] - site.ground_m
+    position = site.target_position_m(target)
+    ground_m = float(ground_under_m(site, position))
+    height_m = position[2] - ground_m
     if height_m <= 0:
         raise InputError(
-            f"target {target} is {height_m:.1f} m above the ground at {site.ground_m:g} m; wind needs a "
+            f"target {target} is {height_m:.1f} m above the ground at {ground_m:g} m; wind needs a "
             "target above it: check its height and ground_height_m"
         )
     return height_m
@@ -130,7 +134,8 @@ def largest_gust_mps(site: Site, targets: Sequence[str] = ()) -> float:
     wind = site.assumed_wind
     fastest_mps = max(wind.speeds_mps) if wind.speeds_mps else wind.speed_range_mps[1]
     intensity = 0.0 if wind.turbulence is None else wind.turbulence.intensity
-    above = [target for target in targets if site.target_position_m(target)[2] > site.ground_m]
+    positions = {target: site.target_position_m(target) for target in targets}
+    above = [name for name, place in positions.items() if place[2] > float(ground_under_m(site, place))]
     growth = max((_growth(site, target) for target in above), default=1.0)
     return fastest_mps * growth * (1 + GUST_STDS * intensity)
 
@@ -145,22 +150,7 @@ def turbulence(site: Site) -> Turbulence | None:
 
 def error_sources(lidar: Lidar, noise_mps: float) -> ErrorSources:
     """What can be wrong with a lidar, as standard deviations; the noise depends on the scan."""
-    unsure = lidar.uncertainty
-    return ErrorSources(
-        radial_speed_mps=noise_mps,
-        azimuth_deg=unsure.azimuth_deg,
-        elevation_deg=unsure.elevation_deg,
-        range_m=unsure.range_m,
-        radial_speed_relative=unsure.radial_speed_relative,
-        heading_deg=unsure.heading_deg,
-        levelling_deg=unsure.levelling_deg,
-        position_m=unsure.position_m,
-        clock_s=unsure.clock_s,
-        radial_speed_correlation=unsure.radial_speed_correlation,
-        azimuth_correlation=unsure.azimuth_correlation,
-        elevation_correlation=unsure.elevation_correlation,
-        range_correlation=unsure.range_correlation,
-    )
+    return made_of(lidar.uncertainty, ErrorSources, radial_speed_mps=noise_mps)
 
 
 def _growth(site: Site, target: str) -> float:

@@ -20,7 +20,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.filters import Filtered, keep
 
-MAD_TO_STD = 1.4826  # of a normal distribution: 1 / 0.6745 (Huber & Ronchetti 2009, Robust Statistics, 5.1)
+MAD_TO_STD = 1.4826  # of a normal distribution: 1 / 0.6745, its upper quartile
 WINDOW_SCANS = 50  # ten minutes of the reference study's 12 s scans
 DISTANCE = 5.0  # robust standard deviations: 4e-6 of normal rays lie beyond it in two dimensions
 LEAST_SPEED_STD_MPS = 0.1  # a lidar's own noise: a calm laminar hour must not make outliers of good rays

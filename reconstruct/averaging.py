@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError
+from reconstruct.periods import TEN_MINUTES_S
 from reconstruct.wind import from_deg, speed_mps
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 TimeArray = NDArray[np.datetime64]
 
 MINUTE_S = 60.0
-TEN_MINUTES_S = 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +39,7 @@ class PeriodSums:
     square_m2s2: FloatArray  # (period,) sums of squared speeds
     turn_east: FloatArray  # (period,) sums of the unit vectors
     turn_north: FloatArray
+    up_mps: FloatArray  # (period,) sums of w; NaN where it is not known of every sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,7 @@ class PeriodMeans:
     from_deg: FloatArray  # (period,) of the mean vector; NaN in a calm
     vane_deg: FloatArray  # (period,) of the mean unit vector, as a vane's
     speed_std_mps: FloatArray  # (period,) of the samples, n - 1; NaN for one
+    w_mps: FloatArray  # (period,) upward; NaN where it is not known of every sample
 
     def availability(self, interval_s: float) -> FloatArray:
         """(period,) share of the samples that a full period has, one every `interval_s` [s]; 1 at the most."""
@@ -86,6 +88,7 @@ def period_sums(
     u_mps: FloatArray,
     v_mps: FloatArray,
     *,
+    w_mps: FloatArray | None = None,
     period_s: float = TEN_MINUTES_S,
     shift_s: float = 0.0,
 ) -> PeriodSums:
@@ -97,6 +100,8 @@ def period_sums(
         (sample,) in any order.
     u_mps, v_mps : numpy.ndarray
         (sample,) eastward and northward wind [m/s].
+    w_mps : numpy.ndarray, optional
+        (sample,) upward wind [m/s].
     period_s : float
         Length of a period [s], a divisor of a day or a multiple of one.
     shift_s : float
@@ -124,7 +129,8 @@ def period_sums(
         return np.bincount(place, weights=values, minlength=len(number)).astype(float)
 
     count = np.bincount(place, minlength=len(number)).astype(np.intp)
-    sums = (total(values) for values in (u, v, speed, np.square(speed), unit_u, unit_v))
+    w = np.full(len(u), np.nan) if w_mps is None else w_mps[known]
+    sums = (total(values) for values in (u, v, speed, np.square(speed), unit_u, unit_v, w))
     return PeriodSums(period_s, number.astype(np.intp), count, *sums)
 
 
@@ -163,6 +169,7 @@ def means_of(sums: PeriodSums) -> PeriodMeans:
         from_deg=from_deg(sums.east_mps, sums.north_mps),
         vane_deg=from_deg(sums.turn_east, sums.turn_north),
         speed_std_mps=np.sqrt(variance),
+        w_mps=sums.up_mps / count,
     )
 
 

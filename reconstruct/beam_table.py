@@ -17,8 +17,7 @@ import numpy as np
 from geometry.arrays import ArrayLike, BoolArray, FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct.climate import Climate
-from reconstruct.lidar_map import radial_variance_m2s2
-from reconstruct.responses import View
+from reconstruct.lidar_map import Air, scaled_variance, sight
 from reconstruct.uncertainty import ErrorSources
 from reconstruct.wind import WindState, uv_mps
 
@@ -103,7 +102,7 @@ def beam_table(
     targets_m : array_like
         (target, 3) in the same frame.
     climates : sequence of Climate
-        One for each target: the wind there.
+        One for each target: the wind there; `condensed` makes it smaller for the same result.
     like : sequence of WindState
         One for each target: everything of the wind but speed and direction; `height_m` is the target's above ground.
     sources : ErrorSources
@@ -148,7 +147,7 @@ def beam_table(
     noise = np.broadcast_to(
         np.asarray(sources.radial_speed_mps if noise_mps is None else noise_mps, float), shape
     )
-    states = _states([condensed(*pair, criterion) for pair in zip(climates, like, strict=True)], like)
+    states = _states(climates, like)
     out = np.empty((6, *shape))
     step = max(CHUNK // len(targets), 1)
     for start in range(0, len(heads), step):
@@ -208,43 +207,21 @@ def _beams(
     out = np.zeros((6, *level.shape))
     with np.errstate(invalid="ignore", divide="ignore"):
         out[0], out[1], out[2] = away[:, 0] / level, away[:, 1] / level, level / distance
-        sine = away[:, 2] / distance
+        gradient = (states.shear_exponent / states.height_m)[:, None]
         for weight, speed, angle in zip(states.weight, states.speed_mps, states.from_deg, strict=True):
             along = np.stack(uv_mps(1.0, angle))[..., None]  # (2, target, 1)
-            view = _view(out, sine, distance, along, speed[:, None], states)
-            variance = weight[:, None] * (noise_mps**2 + radial_variance_m2s2(view, quiet))
+            seen = sight(list(np.moveaxis(away, 1, 0)), along)
+            air = Air(
+                speed[:, None],
+                speed[:, None] * gradient,
+                states.vertical_mps[:, None],
+                states.lateral_per_s,
+            )
+            variance = weight[:, None] * (noise_mps**2 + scaled_variance(seen, air, quiet) / seen.range2)
             for number, part in enumerate(_wanted_part(along, speed[:, None], criterion), start=3):
                 out[number] += part * variance
         out[3:] /= out[2] ** 2
     return out
-
-
-def _view(
-    beam: FloatArray,
-    sine: FloatArray,
-    distance: FloatArray,
-    along: FloatArray,
-    speed: FloatArray,
-    states: _States,
-) -> View:
-    """Beams and the air in their gates, (target, candidate)."""
-    east, north = beam[0] * beam[2], beam[1] * beam[2]
-    gradient = speed * (states.shear_exponent / states.height_m)[:, None]
-    return View(
-        sin_azimuth=beam[0],
-        cos_azimuth=beam[1],
-        sin_elevation=sine,
-        cos_elevation=beam[2],
-        east=east,
-        north=north,
-        range_m=distance,
-        u_mps=along[0] * speed,
-        v_mps=along[1] * speed,
-        w_mps=states.vertical_mps[:, None],
-        shear_per_s=(along[0] * east + along[1] * north) * gradient,
-        lateral_per_s=states.lateral_per_s,
-        downwind=(along[0], along[1]),
-    )
 
 
 def _wanted_part(along: FloatArray, speed: FloatArray, criterion: Criterion) -> tuple[FloatArray, ...]:

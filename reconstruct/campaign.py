@@ -13,12 +13,13 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from reconstruct.climate import Climate
+from reconstruct.periods import TEN_MINUTES_S
 from reconstruct.persistence import random_variance
+from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
 from reconstruct.regression import DirectionRegression, SpeedRegression, regress_direction, regress_speed
-from reconstruct.retrieval import gain, rows
 from reconstruct.spectra import Turbulence
-from reconstruct.ten_minute import AVERAGING_S, Reference, TenMinute, predict_ten_minute
+from reconstruct.ten_minute import Reference, TenMinute, predict_ten_minutes
 from reconstruct.uncertainty import ErrorSources, mean_errors_mps, ray_errors
 from reconstruct.wind import WindState
 
@@ -42,7 +43,7 @@ def predict_campaign(
     sources: ErrorSources | Sequence[ErrorSources] | None = None,
     gains: FloatArray | None = None,
     reference: Reference = "scalar",
-    averaging_s: float = AVERAGING_S,
+    averaging_s: float = TEN_MINUTES_S,
     scan_share: float = 1.0,
     sweep: bool = True,
 ) -> Campaign:
@@ -85,25 +86,20 @@ def predict_campaign(
     >>> round(float(shown.speed.slope), 2), round(float(shown.slope_std), 3)
     (1.0, 0.01)
     """
-    fits = gain(rows(rays.azimuth_deg, rays.elevation_deg)) if gains is None else gains
+    fits = ray_fit(rays).gain if gains is None else gains
     states = climate.states(like)
-    means = []
-    for state in states:
-        random = 0.0 if sources is None else random_variance(rays, state, sources)
-        means.append(
-            predict_ten_minute(
-                rays,
-                state,
-                turbulence,
-                gains=fits,
-                random_m2s2=random,
-                mean_error_mps=np.sum(list(mean_errors_mps(fits, rays, state).values()), axis=0),
-                reference=reference,
-                averaging_s=averaging_s,
-                scan_share=scan_share,
-                sweep=sweep,
-            )
-        )
+    means = predict_ten_minutes(
+        rays,
+        states,
+        turbulence,
+        gains=fits,
+        random_m2s2=[0.0 if sources is None else random_variance(rays, state, sources) for state in states],
+        mean_error_mps=[sum(mean_errors_mps(fits, rays, state).values()) for state in states],
+        reference=reference,
+        averaging_s=averaging_s,
+        scan_share=scan_share,
+        sweep=sweep,
+    )
     slope_std, offset_std = _persistent(rays, climate, states, means, fits, sources)
     speed, direction = regress_speed(climate, means), regress_direction(climate, means)
     return Campaign(means, speed, direction, slope_std, offset_std)

@@ -1,6 +1,7 @@
 """A map of carrier-to-noise ratio around a hard target: rays over azimuth and elevation, gates 1 m apart."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +15,8 @@ MIN_GATES = 5
 
 # Angles of one row or column differ by less than this part of the window; farther apart is the next one.
 SAME_SHARE = 1e-4
+
+ROW_RAYS = 3  # rows and columns are told by angles that so many rays share
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class CnrMap:
         if not (angles_known and np.all(np.diff(self.range_m) > 0)):
             raise InputError("a CNR map needs finite angles and ranges that increase from gate to gate")
 
-    @property
+    @cached_property
     def middle_deg(self) -> tuple[float, float]:
         """Azimuth in [0, 360) and elevation in the middle of the window [deg]."""
         mean_deg = float(circular_mean_deg(self.azimuth_deg))
@@ -64,17 +67,27 @@ class CnrMap:
         middle = float(wrap_360_deg(mean_deg + 0.5 * (aside.min() + aside.max())))
         return middle, float(0.5 * (self.elevation_deg.min() + self.elevation_deg.max()))
 
-    @property
+    @cached_property
     def aside_deg(self) -> tuple[FloatArray, FloatArray]:
         """(ray,) azimuth and elevation less those of the middle [deg]."""
         azimuth, elevation = self.middle_deg
         return np.asarray(difference_deg(self.azimuth_deg, azimuth)), self.elevation_deg - elevation
 
-    @property
+    @cached_property
     def step_deg(self) -> tuple[float, float]:
-        """Usual distance between neighbouring columns and rows [deg]."""
+        """Usual distance between neighbouring columns and rows [deg]; of staggered rays what a ray has to itself."""
         across, up = self.aside_deg
-        return _step(across), _step(up)
+        (wide, columns), (high, rows) = _step(across), _step(up)
+        rays, spans = across.size, (float(np.ptp(across)), float(np.ptp(up)))
+        if columns * ROW_RAYS > rays and rows * ROW_RAYS > rays:  # no ray shares an angle with another
+            flat = float(np.cos(np.deg2rad(self.middle_deg[1])))
+            step = _even_step(spans[0] * flat, spans[1], rays)
+            return step / flat, step
+        if columns * ROW_RAYS > rays:
+            return spans[0] / max(rays / rows - 1.0, 1.0), high
+        if rows * ROW_RAYS > rays:
+            return wide, spans[1] / max(rays / columns - 1.0, 1.0)
+        return wide, high
 
     @property
     def gate_m(self) -> float:
@@ -100,10 +113,16 @@ def map_of(records: Records) -> CnrMap:
     return CnrMap(records.azimuth_deg, records.elevation_deg, records.range_m, records.cnr_db)
 
 
-def _step(angle_deg: FloatArray) -> float:
-    """Median distance between neighbouring values; those of one row are taken for one."""
+def _step(angle_deg: FloatArray) -> tuple[float, int]:
+    """Median distance between neighbouring values, and how many there are; those of one row are taken for one."""
     ordered = np.unique(angle_deg)
     span = float(ordered[-1] - ordered[0])
     gaps = np.diff(ordered)
     gaps = gaps[gaps > SAME_SHARE * span]
-    return float(np.median(gaps)) if gaps.size else 0.0
+    return (float(np.median(gaps)) if gaps.size else 0.0), gaps.size + 1
+
+
+def _even_step(width_deg: float, height_deg: float, rays: int) -> float:
+    """The step with which so many rays fill a window evenly: (width + step)(height + step) = rays step²."""
+    half = 0.5 * (width_deg + height_deg) / (rays - 1)
+    return float(half + np.sqrt(half**2 + width_deg * height_deg / (rays - 1)))

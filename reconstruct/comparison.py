@@ -63,8 +63,8 @@ def fit_speed(mast_mps: ArrayLike, lidar_mps: ArrayLike, *, blocks: int = _JACKK
     Notes
     -----
     a = Σ mast·lidar / Σ lidar² minimises Σ (mast - a·lidar)². Its standard error is a jackknife over blocks
-    of consecutive pairs (Efron & Stein 1981, Ann. Statist. 9, 586-596, doi:10.1214/aos/1176345462), which
-    bears with scatter that grows with the wind and with pairs that hang together.
+    of consecutive pairs (Efron & Stein 1981, Ann. Statist. 9, 586-596, doi:10.1214/aos/1176345462, eq. 1.4 and
+    1.5), which bears with scatter that grows with the wind and with pairs that hang together.
 
     Examples
     --------
@@ -211,8 +211,8 @@ def fit_weibull(speed_mps: ArrayLike) -> WeibullFit:
     Notes
     -----
     The shape k solves Σ V^k ln V / Σ V^k - 1/k = mean ln V, and A = (mean V^k)^(1/k) (Seguro & Lambert 2000,
-    J. Wind Eng. Ind. Aerodyn. 85, 75-84, doi:10.1016/S0167-6105(99)00122-1, equations 9 and 10). The left
-    side rises with k, so that bisection always finds it.
+    J. Wind Eng. Ind. Aerodyn. 85, 75-84, doi:10.1016/S0167-6105(99)00122-1). The left side rises with k,
+    so that bisection always finds it.
 
     Examples
     --------

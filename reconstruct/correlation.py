@@ -92,7 +92,8 @@ def karman_excess(distance: FloatArray) -> FloatArray:
 
     Notes
     -----
-    From incompressibility, g = f + (r/2) f' (Batchelor 1953, section 3.4), and (x^n K_n)' = -x^n K_(n-1).
+    From incompressibility, g = f + (r/2) f' (Batchelor 1953, The Theory of
+    Homogeneous Turbulence), and (x^n K_n)' = -x^n K_(n-1).
 
     Examples
     --------
@@ -117,7 +118,7 @@ def _karman_table() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
 
 @lru_cache(maxsize=64)
 def isotropic(eddy_length_m: float) -> Correlation:
-    """Isotropic von Kármán turbulence: R_ij = (f - g) r_i r_j / r² + g delta_ij (Batchelor 1953)."""
+    """Isotropic von Kármán turbulence: R_ij = (f - g) r_i r_j / r² + g delta_ij (Pope 2000, eq. 6.44)."""
     lateral, lateral_step, excess, excess_step = _karman_table()
     per_root_m = TABLE_POINTS / TABLE_END / math.sqrt(eddy_length_m)
 
@@ -151,7 +152,7 @@ def coherent(kaimal_length_m: float) -> Correlation:
 
     Notes
     -----
-    Coh(d, n) = exp(-12 sqrt((n d/V)² + (0.12 d/L_c)²)) (IEC 61400-1 ed. 4, Annex C), L_c the
+    Coh(d, n) = exp(-12 sqrt((n d/V)² + (0.12 d/L_c)²)) (IEC 61400-1 ed. 4, Annex C.3), L_c the
     longitudinal length; its in-phase cross-spectrum, frozen, gives R(x, d) = integral of S(k) Coh
     cos(2 pi k x) dk.
     """

@@ -7,12 +7,16 @@ correlation of the model averaged over both patches. Frame of the work inside: x
 origin at the target.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
-from geometry.arrays import ArrayLike, FloatArray
+from geometry.arrays import ArrayLike, FloatArray, IntArray
 from geometry.beams import unit_vector
 from reconstruct.correlation import correlation
-from reconstruct.patches import DISTANT_LENGTHS, Air, Patches, pair_correlations, self_correlations
+from reconstruct.patches import Air, Patches, pair_correlations, self_correlations
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.wind import WindState
@@ -60,23 +64,29 @@ def lag_covariance(
     >>> lag_covariance(stare, wind, air, [0, 1])[0, :, 0, 0].round(3)
     array([0.832, 0.507])
     """
-    air = Air(correlation(turbulence), rays.probes, DISTANT_LENGTHS[turbulence.model] * turbulence.length_m)
+    return lag_covariances(rays, [wind], turbulence, lags, sweep=sweep)[0]
+
+
+def lag_covariances(
+    rays: Rays,
+    winds: Sequence[WindState],
+    turbulence: Turbulence,
+    lags: ArrayLike = (0,),
+    *,
+    sweep: bool = True,
+) -> FloatArray:
+    """Work out `lag_covariance` for several winds at once: (wind, pass, lag, ray, ray) [m²/s²]."""
+    air = Air.of(turbulence, rays.probes)
     steps = np.atleast_1d(np.asarray(lags, dtype=np.intp))
-    passes = 2 if rays.back_and_forth else 1
-    patches = [patches_of(rays, wind, reverse=bool(odd), sweep=sweep) for odd in range(passes)]
-    out = np.empty((passes, len(steps), rays.count, rays.count))
+    each = _Passes.of(rays, winds, sweep=sweep)
+    out = np.empty((len(winds), each.passes, len(steps), rays.count, rays.count))
     if np.any(steps == 0):
-        out[:, steps == 0] = _within(air, patches)[:, None]
-    shift = velocity_mps(wind) * rays.period_s
-    first, second = np.indices((rays.count, rays.count)).reshape(2, -1)
-    for odd, parity in np.ndindex(passes, passes):
-        where = np.flatnonzero((steps > 0) & (steps % passes == parity))
+        out[:, :, steps == 0] = _within(air, each)[:, :, None]
+    for parity in range(each.passes):
+        where = np.flatnonzero((steps > 0) & (steps % each.passes == parity))
         if len(where):
-            moved = shift[:, None, None] * steps[where][None, :, None]
-            later = patches[(odd + parity) % passes].take(second)
-            values = pair_correlations(air, patches[odd].take(first), later, moved)
-            out[odd, where] = values.reshape(len(where), rays.count, rays.count)
-    return turbulence.std_mps(wind.speed_mps) ** 2 * out
+            out[:, :, where] = _between(air, each, steps[where], rays.period_s)
+    return _variances(winds, turbulence)[:, None, None, None, None] * out
 
 
 def target_covariance(
@@ -97,19 +107,30 @@ def target_covariance(
         (pass, time, ray, 2) covariance [m²/s²] with the downwind component at the target, and with the one to
         its left.
     """
-    air = Air(correlation(turbulence), rays.probes, DISTANT_LENGTHS[turbulence.model] * turbulence.length_m)
+    return target_covariances(rays, [wind], turbulence, times_s, sweep=sweep)[0]
+
+
+def target_covariances(
+    rays: Rays,
+    winds: Sequence[WindState],
+    turbulence: Turbulence,
+    times_s: ArrayLike,
+    *,
+    sweep: bool = True,
+) -> FloatArray:
+    """Work out `target_covariance` for several winds at once: (wind, pass, time, ray, 2) [m²/s²]."""
+    air = Air.of(turbulence, rays.probes)
     moments = np.atleast_1d(np.asarray(times_s, dtype=float))
-    moved = velocity_mps(wind)[:, None, None] * moments[None, :, None]
-    passes = 2 if rays.back_and_forth else 1
-    out = np.empty((passes, len(moments), rays.count, 2))
-    still = np.zeros((3, rays.count))
-    for odd, component in np.ndindex(passes, 2):
-        patches = patches_of(rays, wind, reverse=bool(odd), sweep=sweep)
-        along = still.copy()
-        along[component] = 1.0
-        point = Patches(still, along, still, patches.lidar)
-        out[odd, :, :, component] = pair_correlations(air, patches, point, moved, to_point=True)
-    return turbulence.std_mps(wind.speed_mps) ** 2 * out
+    each = _Passes.of(rays, winds, sweep=sweep)
+    shape = (len(winds), each.passes, rays.count, 2)
+    ray = np.repeat(np.arange(len(each.patches.lidar)), 2)
+    along = np.tile(np.eye(3)[:, :2], len(ray) // 2)
+    still = np.zeros_like(along)
+    seen = each.patches.take(ray)
+    moved = each.moved_m(moments, 2 * each.passes * rays.count)
+    values = pair_correlations(air, seen, Patches(still, along, still, seen.lidar), moved, to_point=True)
+    out = np.moveaxis(values.reshape(len(moments), *shape), 0, 2)
+    return _variances(winds, turbulence)[:, None, None, None, None] * out
 
 
 def point_covariance(wind: WindState, turbulence: Turbulence, times_s: ArrayLike) -> FloatArray:
@@ -143,20 +164,11 @@ def point_covariance(wind: WindState, turbulence: Turbulence, times_s: ArrayLike
 
 def patches_of(rays: Rays, wind: WindState, *, reverse: bool = False, sweep: bool = True) -> Patches:
     """Patches of the rays of one scan; `reverse` gives the scan that runs back through the same azimuths."""
-    turn = wind_frame(wind.from_deg)
-    velocity = velocity_mps(wind)
-    time_s, way = rays.time_s, 1.0
     if reverse:
-        time_s, way = rays.reversed_time_s, -1.0
-    centre = turn @ rays.centre_m.T - np.outer(velocity, time_s)
-    beam = turn @ unit_vector(rays.azimuth_deg, rays.elevation_deg).T
-    angle = np.radians(rays.azimuth_deg)
-    arc = way * np.radians(rays.swept_azimuth_deg) * rays.range_m * np.cos(np.radians(rays.elevation_deg))
-    across = np.stack([np.cos(angle), -np.sin(angle), np.zeros_like(angle)])
-    moved = turn @ (across * arc) - np.outer(velocity, rays.duration_s)
-    return Patches(
-        centre, beam, moved if sweep else np.zeros_like(moved), np.asarray(rays.lidar, dtype=np.intp)
-    )
+        rays = replace(
+            rays, time_s=rays.reversed_time_s, swept_azimuth_deg=-rays.swept_azimuth_deg, back_and_forth=False
+        )
+    return _Passes.of(replace(rays, back_and_forth=False), [wind], sweep=sweep).patches
 
 
 def velocity_mps(wind: WindState) -> FloatArray:
@@ -179,18 +191,75 @@ def wind_frame(from_deg: float) -> FloatArray:
     return np.array([[east, north, 0.0], [-north, east, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _within(air: Air, passes: list[Patches]) -> FloatArray:
-    """Correlations (pass, ray, ray) inside one scan: half of the pairs, mirrored, and the rays alone."""
-    count = passes[0].centre_m.shape[1]
-    every = Patches(*(np.concatenate(parts, axis=-1) for parts in zip(*passes, strict=True)))
-    out = np.empty((len(passes), count, count))
+class _Passes(NamedTuple):
+    """The patches of every ray in every different pass and wind."""
+
+    patches: Patches  # all of (wind, pass, ray)
+    velocity_mps: FloatArray  # (3, wind)
+    passes: int
+
+    @classmethod
+    def of(cls, rays: Rays, winds: Sequence[WindState], *, sweep: bool) -> "_Passes":
+        velocity = np.stack([velocity_mps(wind) for wind in winds], axis=-1)
+        angle = np.radians(rays.azimuth_deg)
+        arc = np.radians(rays.swept_azimuth_deg) * rays.range_m * np.cos(np.radians(rays.elevation_deg))
+        beam = unit_vector(rays.azimuth_deg, rays.elevation_deg)
+        across = np.stack([arc * np.cos(angle), -arc * np.sin(angle), np.zeros_like(arc)])
+        seen = np.stack([(rays.head_m + rays.range_m[:, None] * beam).T, beam.T, across], axis=1)
+        frames = np.stack([wind_frame(wind.from_deg) for wind in winds])
+        turned = np.einsum("wij,jkr->ikwr", frames, seen)[:, :, :, None]  # (3, kind, wind, 1, ray)
+        times, way = rays.time_s[None], np.ones((1, 1))
+        if rays.back_and_forth:
+            times, way = np.stack([rays.time_s, rays.reversed_time_s]), np.array([[1.0], [-1.0]])
+        carried = velocity[:, :, None, None]
+        shape = (3, len(winds), len(times), rays.count)
+        moved = way * turned[:, 2] - carried * rays.duration_s if sweep else np.zeros(shape)
+        parts = (turned[:, 0] - carried * times, np.broadcast_to(turned[:, 1], shape), moved)
+        lidar = np.tile(np.asarray(rays.lidar, dtype=np.intp), len(winds) * len(times))
+        return cls(Patches(*(part.reshape(3, -1) for part in parts), lidar), velocity, len(times))
+
+    @property
+    def scans(self) -> int:
+        """Number of winds times passes."""
+        return self.passes * self.velocity_mps.shape[1]
+
+    def moved_m(self, times_s: FloatArray, pairs: int) -> FloatArray:
+        """How far the air goes: (3, time, wind times pairs), or (3, time, 1) where all winds are alike."""
+        velocity = self.velocity_mps
+        if np.all(velocity == velocity[:, :1]):
+            velocity, pairs = velocity[:, :1], 1
+        return np.repeat(velocity, pairs, axis=1)[:, None] * times_s[:, None]
+
+
+def _variances(winds: Sequence[WindState], turbulence: Turbulence) -> FloatArray:
+    """(wind,) of the downwind component [m²/s²]."""
+    return np.array([turbulence.std_mps(wind.speed_mps) for wind in winds]) ** 2
+
+
+def _within(air: Air, each: _Passes) -> FloatArray:
+    """Correlations (wind, pass, ray, ray) inside one scan: half of the pairs, mirrored, and the rays alone."""
+    count = len(each.patches.lidar) // each.scans
+    out = np.empty((each.scans, count, count))
     first, second = np.triu_indices(count, 1)
     if len(first):
-        start = count * np.arange(len(passes))[:, None]
-        pairs = every.take((first + start).ravel()), every.take((second + start).ravel())
-        values = pair_correlations(air, *pairs, np.zeros((3, 1, 1))).reshape(len(passes), -1)
+        start = count * np.arange(each.scans)[:, None]
+        pairs = (each.patches.take((part + start).ravel()) for part in (first, second))
+        values = pair_correlations(air, *pairs, np.zeros((3, 1, 1))).reshape(each.scans, -1)
         out[:, first, second] = values
         out[:, second, first] = values
     diagonal = np.arange(count)
-    out[:, diagonal, diagonal] = self_correlations(air, every).reshape(len(passes), count)
-    return out
+    out[:, diagonal, diagonal] = self_correlations(air, each.patches).reshape(each.scans, count)
+    return out.reshape(-1, each.passes, count, count)
+
+
+def _between(air: Air, each: _Passes, steps: IntArray, period_s: float) -> FloatArray:
+    """Correlations (wind, pass, lag, ray, ray) of scans and later ones, all an even or all an odd number later."""
+    count = len(each.patches.lidar) // each.scans
+    place = np.arange(each.scans * count).reshape(-1, each.passes, count)
+    later = place[:, (np.arange(each.passes) + steps[0]) % each.passes]
+    shape = (*place.shape, count)
+    first, second = np.broadcast_arrays(place[..., None], later[:, :, None])
+    moved = each.moved_m(period_s * steps, each.passes * count**2)
+    patches = each.patches
+    values = pair_correlations(air, patches.take(first.ravel()), patches.take(second.ravel()), moved)
+    return np.moveaxis(values.reshape(len(steps), *shape), 0, 2)

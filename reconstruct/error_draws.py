@@ -33,6 +33,15 @@ class Draws(NamedTuple):
         still = np.zeros((1, rays.count))
         return cls(still, still, still, still, np.zeros((1, rays.count, 3)))
 
+    @property
+    def any(self) -> bool:
+        """Whether there is any error."""
+        return any(bool(np.any(values)) for values in self)
+
+    def mean(self) -> "Draws":
+        """The errors of arrays (scan, ray) on average over the scans: what lasts."""
+        return Draws(*(np.mean(values, axis=0, keepdims=True) for values in self))
+
     def realisation(self, index: int) -> "Draws":
         """The errors of one realisation, of arrays (realisation, scan, ray)."""
         return Draws(*(values[index] for values in self))

@@ -111,8 +111,8 @@ def factorise(
 def orthogonalise(columns: Sequence[FloatArray]) -> tuple[tuple[FloatArray, ...], FloatArray]:
     """Modified Gram-Schmidt with scaled columns, each pass made again where it takes much of a column away.
 
-    "Twice is enough" to be orthogonal to rounding (Giraud et al. 2005, Numer. Math. 101, 87-100,
-    doi:10.1007/s00211-005-0615-4).
+    "Twice is enough" to be orthogonal to rounding: shown for the classical form, the worse one, by Giraud et al. (2005),
+    Numer. Math. 101, 87-100, doi:10.1007/s00211-005-0615-4.
 
     Parameters
     ----------

@@ -250,8 +250,8 @@ def goodness(fit: Retrieval, radial_speed_mps: FloatArray, *, noise_mps: float) 
     Notes
     -----
     r² of a narrow sector is low even when the fit is good: the wind hardly differs from ray to ray there, so
-    that all is noise. The reduced χ² (Bevington & Robinson 2003, Data Reduction and Error Analysis, section
-    11.1) has no such trouble, but turbulence makes it large. For a filter the residual's own size is the
+    that all is noise. The reduced χ² (Bevington & Robinson 2003, Data Reduction and Error
+    Analysis) has no such trouble, but turbulence makes it large. For a filter the residual's own size is the
     plainest.
 
     Examples

@@ -6,20 +6,21 @@ U t.
 """
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.arrays import ArrayLike, FloatArray, IntArray
 from reconstruct.error_draws import Draws
-from reconstruct.field import Field, subgrid_covariance
+from reconstruct.field import Field
 from reconstruct.radial_speed import power_law_mps
 from reconstruct.rays import Rays
-from reconstruct.spectra import Turbulence
+from reconstruct.waves import Waves
 from reconstruct.wind import WindState
 
 _CHUNK_POINTS = 1 << 17
+_BLOCK = 64  # times whose phases are a product of two shorter lists
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,7 @@ def radial_speed_mps(
     Returns
     -------
     numpy.ndarray
-        (scan, ray) [m/s], positive away from the lidar, the resolved part of the turbulence only.
+        (scan, ray) [m/s], positive away from the lidar; of the turbulence the box alone: `WaveSight` has the rest.
     """
     times = rays.times_s(scans)
     speed = np.empty(times.shape)
@@ -153,7 +154,7 @@ def radial_speed_mps(
 def reference_mps(
     wind: WindState, times_s: FloatArray, *, field: Field, std_mps: float, shift_m: ArrayLike
 ) -> FloatArray:
-    """Wind (time, 3) that a point instrument at the target meets [m/s], its resolved turbulence only."""
+    """Wind (time, 3) that a point instrument at the target meets [m/s]; of the turbulence the box alone."""
     places = np.asarray(shift_m) - times_s[:, None] * carried_mps(wind)
     return np.asarray(carried_mps(wind) + std_mps * field.at(places))
 
@@ -165,65 +166,93 @@ def reach_m(rays: Rays, wind: WindState, duration_s: float) -> FloatArray:
     return np.asarray(np.ptp(places, axis=0) + np.abs(carried_mps(wind)) * duration_s)
 
 
-def subgrid_root(rays: Rays, wind: WindState, turbulence: Turbulence, cut_per_m: float) -> FloatArray:
-    """Matrix (ray, ray) that makes of independent normal numbers what small eddies add to the rays.
+@dataclass(frozen=True)
+class WaveSight:
+    """What a scan makes of the waves that a box cannot carry."""
 
-    Parameters
-    ----------
-    rays : Rays
-        The scan as planned.
-    wind : WindState
-        Mean wind.
-    turbulence : Turbulence
-        Model and length.
-    cut_per_m : float
-        Largest wavenumber that the field has [rad/m].
+    seen: NDArray[np.float32]  # (pass, 4 wave, ray): real and imaginary parts by which `amplitudes` count
+    turning_per_s: FloatArray  # (wave,) phase that passes the target [rad/s]
+    period_s: float
 
-    Returns
-    -------
-    numpy.ndarray
-        Root of their covariance in the radial speeds, for a longitudinal variance of 1.
+    @classmethod
+    def of(
+        cls, rays: Rays, wind: WindState, waves: Waves, draws: Draws, *, offset_m: ArrayLike = (0.0, 0.0, 0.0)
+    ) -> "WaveSight":
+        """Work out what each ray of both directions of a scan leaves of each wave.
 
-    Notes
-    -----
-    The average over the probe leaves of a wave what `Probe.transfer` says of its wavenumber along the beam;
-    the ray's way through the air (its own sweep, and the wind that passes meanwhile) leaves sin(x)/x, with x
-    half the phase that the wave turns on that way. Rays of different lidars that cross share small eddies;
-    those of one lidar, which follow each other in place and time, are taken as independent.
-    """
-    beam = beams(rays.azimuth_deg, rays.elevation_deg, wind.from_deg)
-    way = _way_m(rays, wind, beam)
-    place = to_wind_frame(rays.centre_m, wind.from_deg) - rays.time_s[:, None] * carried_mps(wind)
-    covariance = np.zeros((rays.count, rays.count))
+        Parameters
+        ----------
+        rays, wind : Rays, WindState
+            The scan and the mean wind.
+        waves : Waves
+            From the field.
+        draws : Draws
+            What pointing and position do wrong, on average over the scans: a jitter is small beside the waves.
+        offset_m : array_like
+            (3,) place of the scan's target in the frame of the waves [m].
 
-    def left(ray: int, wavevector: FloatArray) -> FloatArray:
-        along, passing = (np.tensordot(vector[ray], wavevector, axes=1) for vector in (beam, way))
-        return np.asarray(rays.probes[int(rays.lidar[ray])].transfer(along) * np.sinc(passing / (2 * np.pi)))
+        Notes
+        -----
+        The average over the probe leaves of a wave what `Probe.transfer` says of its wavenumber along the beam;
+        the ray's way through the air (its own sweep, and the wind that passes meanwhile) leaves sin(x)/x, with
+        x half the phase that the wave turns on that way.
+        """
+        steady = draws.mean()
+        middle = Sampling(probe_points=1, sweep_points=1)
+        sight = _sight(rays, wind, steady, np.arange(2), middle)
+        when = np.stack([rays.time_s, rays.reversed_time_s]) + steady.delay_s
+        passes = 1 + rays.back_and_forth
+        velocity = carried_mps(wind)
+        seen = np.empty((passes, 4 * waves.vector.shape[1], rays.count), dtype=np.float32)
+        for index in range(passes):
+            beam = sight.beam[index, :, 0]
+            place = sight.points_m[index, :, 0, 0] + np.asarray(offset_m) - when[index, :, None] * velocity
+            way = _way_m(rays, wind, beam, reverse=index == 1)
+            along = waves.vector.T @ beam.T
+            kept = np.sinc(waves.vector.T @ way.T / (2 * np.pi))
+            for lidar, probe in enumerate(rays.probes):
+                kept[:, rays.lidar == lidar] *= probe.transfer(along[:, rays.lidar == lidar])
+            phase = kept * np.exp(1j * (waves.vector.T @ place.T))
+            one, other = (root.T @ beam.T * phase for root in (waves.first, waves.second))
+            seen[index] = np.concatenate([one.real, one.imag, other.real, other.imag])
+        return cls(seen, velocity @ waves.vector, rays.period_s)
 
-    for one, other in combinations_with_replacement(range(rays.count), 2):
-        if one != other and not _meet(rays, place, one, other):
-            continue
-        gap = place[one] - place[other]
-
-        def shared(k: FloatArray, one: int = one, other: int = other, gap: FloatArray = gap) -> FloatArray:
-            return np.asarray(left(one, k) * left(other, k) * np.cos(np.tensordot(gap, k, axes=1)))
-
-        small = subgrid_covariance(turbulence, cut_per_m, response=shared, axis=beam[one])
-        covariance[one, other] = covariance[other, one] = beam[one] @ small @ beam[other]
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+    def radial_speed(self, amplitudes: FloatArray, scans: int) -> FloatArray:
+        """(scan, ray) sum of the waves, for a standard deviation of 1, in consecutive scans."""
+        passes = len(self.seen)
+        out = np.empty((scans, self.seen.shape[2]))
+        for index in range(passes):
+            first_s, step_s = self.period_s * index, self.period_s * passes
+            count = len(range(index, scans, passes))
+            turned = _turned(amplitudes, self.turning_per_s, first_s, step_s, count)
+            out[index::passes] = turned.reshape(count, -1) @ self.seen[index]
+        return out
 
 
-def _meet(rays: Rays, place_m: FloatArray, one: int, other: int) -> bool:
-    """Whether rays of different lidars may share small eddies: gates within a probe in the moving air."""
-    lidars = int(rays.lidar[one]), int(rays.lidar[other])
-    reach = max(rays.probes[lidar].length_m for lidar in lidars)
-    return lidars[0] != lidars[1] and float(np.linalg.norm(place_m[one] - place_m[other])) < reach
+def met_waves(
+    wind: WindState, waves: Waves, amplitudes: FloatArray, *, first_s: float, step_s: float, count: int
+) -> FloatArray:
+    """Sum of the waves (time, 3) at the target at equal steps of time, for a standard deviation of 1."""
+    turned = _turned(amplitudes, carried_mps(wind) @ waves.vector, first_s, step_s, count)
+    return np.asarray(turned[:, 0] @ waves.first.T + turned[:, 2] @ waves.second.T)
 
 
-def _way_m(rays: Rays, wind: WindState, beam: FloatArray) -> FloatArray:
+def _turned(
+    amplitudes: FloatArray, turning_per_s: FloatArray, first_s: float, step_s: float, count: int
+) -> NDArray[np.float32]:
+    """(time, 4, wave) factors of the four parts of each wave: amplitudes, turned on by the passing air."""
+    late, early = np.arange(0, count, _BLOCK), np.arange(min(_BLOCK, count))
+    starts = np.exp(-1j * np.outer(first_s + step_s * late, turning_per_s)).astype(np.complex64)
+    steps = np.exp(-1j * np.outer(step_s * early, turning_per_s)).astype(np.complex64)
+    phase = (starts[:, None] * steps).reshape(-1, len(turning_per_s))[:count]
+    both = amplitudes.astype(np.float32)
+    one, other = (phase * (part[0] + 1j * part[1]) for part in both)
+    return np.stack([one.real, -one.imag, other.real, -other.imag], axis=1)
+
+
+def _way_m(rays: Rays, wind: WindState, beam: FloatArray, *, reverse: bool) -> FloatArray:
     """(ray, 3) way of each gate through the moving air during its ray [m]."""
-    turn = np.radians(rays.swept_azimuth_deg)[:, None]
+    turn = (-1 if reverse else 1) * np.radians(rays.swept_azimuth_deg)[:, None]
     sideways = np.stack([beam[:, 1], -beam[:, 0], np.zeros(rays.count)], axis=-1)  # clockwise
     return np.asarray(rays.range_m[:, None] * turn * sideways - rays.duration_s[:, None] * carried_mps(wind))
 

@@ -48,7 +48,7 @@ def wind_moments(
     Where the error is under NARROW of the wind: a Gauss-Hermite product rule over the two axes of the error,
     on the differences |V| - |V0| and the angle between V and V0, so that nothing cancels. Elsewhere, calm
     included: polar coordinates of the scaled error, its radius in closed form (the projected normal
-    distribution: Mardia & Jupp 2000, Directional Statistics, section 3.5.6), its angle by Gauss-Legendre
+    distribution: Jammalamadaka & SenGupta 2001, Topics in Circular Statistics, section 2.2.4), its angle by Gauss-Legendre
     rules that crowd where the integrand turns sharply.
 
     Parameters

@@ -16,17 +16,20 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct import retrieval
-from reconstruct.error_draws import Sources, draw_pointing, draw_speed_errors
+from reconstruct.error_draws import Draws, Sources, draw_pointing, draw_speed_errors
 from reconstruct.field import Field, synthesise
 from reconstruct.flight import (
     Sampling,
+    WaveSight,
     is_uniform,
+    met_waves,
     radial_speed_mps,
     reach_m,
     reference_mps,
-    subgrid_root,
     uniform_radial_speed_mps,
 )
+from reconstruct.periods import TEN_MINUTES_S
+from reconstruct.ray_fit import ray_rows
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.uncertainty import ErrorSources
@@ -35,7 +38,6 @@ from reconstruct.wind import WindState, uv_mps
 
 Progress = Callable[[float], None]
 
-AVERAGING_S = 600.0
 REFERENCE_INTERVAL_S = 1.0  # of the samples of the instrument at the target
 _CHUNK_RAYS = 1 << 16
 _BLOCKS = 20  # of realisations without turbulence, which share nothing
@@ -53,7 +55,7 @@ class Settings(NamedTuple):
 
     realisations: int = 64
     flights_per_field: int = 4
-    averaging_s: float = AVERAGING_S
+    averaging_s: float = TEN_MINUTES_S
     sampling: Sampling = Sampling()
     spacing_m: float | None = None
 
@@ -131,9 +133,8 @@ def simulate_scenes(
 
     Notes
     -----
-    The field passes at the speed of the wind at the target, whatever the shear (Taylor's hypothesis). Eddies
-    smaller than the field's cells are noise, independent from scan to scan and from sample to sample, whose
-    covariance is what the rays' own averaging leaves of them (`flight.subgrid_root`).
+    The field passes at the speed of the wind at the target, whatever the shear (Taylor's hypothesis). Flights
+    through one field have the same wavevectors beside the box, each with amplitudes of its own.
     """
     sources = ErrorSources() if sources is None else sources
     _check(scenes, settings)
@@ -171,7 +172,7 @@ def _without_turbulence(
     rays, wind = scene
     scans = scans_in(rays, settings.averaging_s)
     step = max(1, _CHUNK_RAYS // (scans * rays.count))
-    rows = retrieval.rows(rays.azimuth_deg, rays.elevation_deg)
+    rows = ray_rows(rays)
     found = np.empty((settings.realisations, scans, 2))
     for start in range(0, settings.realisations, step):
         shape = (min(step, settings.realisations - start), scans)
@@ -186,9 +187,8 @@ def _without_turbulence(
                     for one in flights
                 ]
             )
-        found[start : start + step] = retrieval.solve(
-            rows, _measured(clean, sources, rays, shape, rng)
-        ).wind_mps
+        fit = retrieval.solve(rows, _measured(clean, sources, rays, shape, rng))
+        found[start : start + step] = fit.wind_mps[..., :2]
     reference = np.broadcast_to(wind.uv_mps, (settings.realisations, 1, 2))
     block = np.arange(settings.realisations) * _BLOCKS // max(_BLOCKS, settings.realisations)
     return Simulation(wind, found, reference, block, float(retrieval.condition(rows)))
@@ -214,13 +214,11 @@ def _with_turbulence(
     fields = int(block[-1]) + 1
     extent = np.max([reach_m(rays, wind, settings.averaging_s) for rays, wind in scenes], axis=0)
     flown: list[list[Simulation]] = [[] for _ in scenes]
-    subgrid: list[FloatArray] = []
     for number in range(fields):
         field = synthesise(turbulence, extent, rng=rng, spacing_m=settings.spacing_m)
-        subgrid = subgrid or [subgrid_root(*scene, turbulence, field.cut_per_m) for scene in scenes]
         shifts = spread_shifts_m(field, int(np.count_nonzero(block == number)), rng)
         for index, scene in enumerate(scenes):
-            air = Air(field, turbulence.std_mps(scene.wind.speed_mps), subgrid[index])
+            air = Air(field, turbulence.std_mps(scene.wind.speed_mps))
             flown[index].append(fly_through(air, scene, shifts, rng=rng, sources=sources, settings=settings))
             _tell(progress, (number + (index + 1) / len(scenes)) / fields)
         del field, air  # before the next one is made
@@ -242,7 +240,6 @@ class Air(NamedTuple):
 
     field: Field
     std_mps: float  # of the downwind component
-    subgrid_root: FloatArray  # (ray, ray) of what the field lacks in the rays, from `flight.subgrid_root`
 
 
 def spread_shifts_m(field: Field, flights: int, rng: np.random.Generator) -> FloatArray:
@@ -285,8 +282,9 @@ def fly_through(
     """
     rays, wind = scene
     scans = scans_in(rays, settings.averaging_s)
-    rows = retrieval.rows(rays.azimuth_deg, rays.elevation_deg)
+    rows = ray_rows(rays)
     found, met = [], []
+    planned = WaveSight.of(rays, wind, air.field.waves, Draws.none(rays))
     for shift in shifts_m:
         draws = draw_pointing(sources, rays, (1, scans), rng).realisation(0)
         clean = radial_speed_mps(
@@ -299,28 +297,35 @@ def fly_through(
             std_mps=air.std_mps,
             shift_m=shift,
         )
-        clean += air.std_mps * rng.standard_normal(clean.shape) @ air.subgrid_root.T
-        found.append(retrieval.solve(rows, _measured(clean, sources, rays, (1, scans), rng)[0]).wind_mps)
-        met.append(_reference_uv_mps(wind, air, shift, settings.averaging_s, rng))
+        amplitudes = air.field.waves.amplitudes(rng)
+        sight = WaveSight.of(rays, wind, air.field.waves, draws) if draws.any else planned
+        clean += air.std_mps * sight.radial_speed(amplitudes, scans)
+        fit = retrieval.solve(rows, _measured(clean, sources, rays, (1, scans), rng)[0])
+        found.append(fit.wind_mps[..., :2])
+        met.append(reference_uv_mps(wind, air, shift, amplitudes, settings.averaging_s))
     return Simulation(
         wind,
         np.stack(found),
         np.stack(met),
         block=np.zeros(len(shifts_m), dtype=np.intp),
         condition=float(retrieval.condition(rows)),
-        subgrid_share=float(air.field.subgrid[0, 0]),
-        box_share=air.field.box_share,
     )
 
 
-def _reference_uv_mps(
-    wind: WindState, air: Air, shift_m: FloatArray, averaging_s: float, rng: np.random.Generator
+def reference_uv_mps(
+    wind: WindState, air: Air, shift_m: FloatArray, amplitudes: FloatArray, averaging_s: float
 ) -> FloatArray:
-    """Eastward and northward wind (sample, 2) of an instrument at the target."""
+    """Eastward and northward wind (sample, 2) of an instrument at the target, `REFERENCE_INTERVAL_S` apart [m/s]."""
     times = np.arange(0.5 * REFERENCE_INTERVAL_S, averaging_s, REFERENCE_INTERVAL_S)
     met = reference_mps(wind, times, field=air.field, std_mps=air.std_mps, shift_m=shift_m)
-    small = rng.multivariate_normal(np.zeros(3), air.field.subgrid, size=len(times), method="cholesky")
-    met = met + air.std_mps * small
+    met = met + air.std_mps * met_waves(
+        wind,
+        air.field.waves,
+        amplitudes,
+        first_s=0.5 * REFERENCE_INTERVAL_S,
+        step_s=REFERENCE_INTERVAL_S,
+        count=len(times),
+    )
     downwind = np.stack(uv_mps(1.0, wind.from_deg))
     left = np.array([-downwind[1], downwind[0]])
     return np.asarray(met[:, :1] * downwind + met[:, 1:2] * left)

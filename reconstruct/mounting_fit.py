@@ -2,47 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from geometry.angles import difference_deg
-from geometry.arrays import FloatArray, IntArray
-from geometry.beams import beam_to, unit_vector
+from geometry.arrays import FloatArray
+from geometry.beams import beam_to
 from geometry.errors import InputError
 from geometry.head import Mounting
-
-Angle = Literal["heading_deg", "azimuth_offset_deg", "elevation_offset_deg", "pitch_deg", "roll_deg"]
-
-# Heading and azimuth offset do the same to a head that is nearly level: the offset is solved for, the heading
-# stays as it is.
-ANGLES: tuple[Angle, ...] = ("azimuth_offset_deg", "elevation_offset_deg", "pitch_deg", "roll_deg")
-
-# Singular values under this share of the largest: what is solved for cannot be told apart at all.
-RANK_SHARE = 1e-6
-
-# An angle counts as undetermined where it comes out four times worse than the best target is measured: every
-# error of a map or a survey would be that much larger in it. Three targets in a line with the lidar tell the
-# tilt across that line by their azimuths alone, 10 times worse at 3° elevation and 4 at 8°; targets at 0, 30
-# and 60° reach 7, at 0, 45 and 90° 3, all around 0.8.
-WEAKENING = 4.0
+from reconstruct.sightings import ANGLES, Angle, Sighting, angles_left, undetermined, whitened, whitening
 
 OUTLIER_CHANCE = 1e-3  # residuals that good data have less often than this are called an outlier's
 SIGNIFICANT_CHANCE = 0.05  # two-sided
-
-
-class Sighting(NamedTuple):
-    """One target: where it is, and where the head found it. An unknown measured angle has std NaN."""
-
-    name: str
-    enu_m: FloatArray  # (3,) from the head, about the axes that the mounting's zero counts from
-    azimuth_head_deg: float
-    elevation_head_deg: float
-    range_head_m: float
-    azimuth_std_deg: float
-    elevation_std_deg: float
-    range_std_m: float
-    position_std_m: float  # of the target itself, each coordinate
 
 
 class Residual(NamedTuple):
@@ -80,16 +52,24 @@ class MountingFit:
         place = self.solved.index(angle)
         return float(np.sqrt(self.covariance_deg2[place, place]))
 
-    def is_significant(self, angle: Angle, than_deg: float = 0.0) -> bool:
-        """Whether a solved angle differs from another value at the 5 % level.
+    @property
+    def coverage_factor(self) -> float:
+        """Standard deviations from which on a change is significant at the 5 % level, by Student's distribution.
 
-        The few angles left over are all that checks the stated uncertainties: the coverage factor is
-        Student's with that freedom (GUM, JCGM 100:2008, G.3), 4.3 for 2 and 12.7 for 1 or none.
+        The stated uncertainties of maps and survey are estimates themselves, and the angles left over are all that
+        checks them. The factor is therefore Student's with that freedom (GUM, JCGM 100:2008, G.3): 4.3 for 2 angles
+        left over, 12.7 for 1 or none, as in a least-squares fit that states no uncertainties. Taken for exact,
+        they would call a roll of 3.4 standard deviations significant that three elevations give for three
+        unknowns; the case that is published so calls the elevation offset alone significant.
         """
         from scipy.special import stdtrit
 
-        factor = float(stdtrit(max(self.freedom, 1), 1.0 - 0.5 * SIGNIFICANT_CHANCE))
-        return bool(abs(getattr(self.mounting, angle) - than_deg) > factor * self.std_deg(angle))
+        return float(stdtrit(max(self.freedom, 1), 1.0 - 0.5 * SIGNIFICANT_CHANCE))
+
+    def is_significant(self, angle: Angle, than_deg: float = 0.0) -> bool:
+        """Whether a solved angle differs from another value by more than the coverage factor says."""
+        moved = abs(getattr(self.mounting, angle) - than_deg)
+        return bool(moved > self.coverage_factor * self.std_deg(angle))
 
 
 def fit_mounting(
@@ -134,6 +114,7 @@ def fit_mounting(
 
     Examples
     --------
+    >>> from geometry.beams import unit_vector
     >>> true = Mounting(azimuth_offset_deg=12.31, elevation_offset_deg=0.6, pitch_deg=0.03)
     >>> def seen(name, azimuth_deg):
     ...     azimuth, elevation = true.to_head(azimuth_deg, 5.0)
@@ -153,7 +134,7 @@ def fit_mounting(
     _refuse_undetermined(sightings, kept, start, solve, head_std_m)
     while True:
         values, normal, chi_square = _solved(sightings, kept, start, solve, head_std_m)
-        freedom = _whitening(sightings, kept, head_std_m)[0].size - len(solve)
+        freedom = whitening(sightings, kept, head_std_m)[0].size - len(solve)
         if _chance(chi_square, freedom) > OUTLIER_CHANCE:
             break
         kept.remove(_worst(sightings, kept, start, solve, head_std_m))
@@ -174,65 +155,6 @@ def fit_mounting(
     )
 
 
-def _pointed(sightings: Sequence[Sighting], mounting: Mounting) -> FloatArray:
-    """(target, 3) where the head pointed, by exact rotation of the corrected head angles."""
-    from scipy.spatial.transform import Rotation
-
-    turns = [-mounting.heading_deg, mounting.pitch_deg, mounting.roll_deg]  # about up, right, front
-    azimuth = np.array([item.azimuth_head_deg for item in sightings]) + mounting.azimuth_offset_deg
-    elevation = np.array([item.elevation_head_deg for item in sightings]) + mounting.elevation_offset_deg
-    return np.asarray(Rotation.from_euler("ZXY", turns, degrees=True).apply(unit_vector(azimuth, elevation)))
-
-
-def _angles_left(sightings: Sequence[Sighting], mounting: Mounting) -> FloatArray:
-    """(target, 2) angles from where the head pointed to the target, across and upward [deg]."""
-    pointed = beam_to(_pointed(sightings, mounting))
-    true = beam_to(np.array([item.enu_m for item in sightings]))
-    across = difference_deg(true.azimuth_deg, pointed.azimuth_deg) * np.cos(np.deg2rad(true.elevation_deg))
-    return np.stack([across, true.elevation_deg - pointed.elevation_deg], axis=1)
-
-
-def _sides(item: Sighting) -> FloatArray:
-    """(2, 3) what a shift of the target changes: angle across and upward [deg/m]."""
-    beam = beam_to(item.enu_m)
-    right = unit_vector(float(beam.azimuth_deg) + 90.0, 0.0)
-    upward = unit_vector(float(beam.azimuth_deg), float(beam.elevation_deg) + 90.0)
-    return np.asarray(np.rad2deg(np.stack([right, upward]) / float(beam.range_m)))
-
-
-def _whitening(
-    sightings: Sequence[Sighting], kept: list[int], head_std_m: float
-) -> tuple[IntArray, FloatArray]:
-    """Places of the known angles in (target, 2), flat, and the Cholesky factor of their covariance [deg]."""
-    items = [sightings[number] for number in kept]
-    cosine = np.cos(np.deg2rad([float(beam_to(item.enu_m).elevation_deg) for item in items]))
-    measured = np.array([(item.azimuth_std_deg, item.elevation_std_deg) for item in items])
-    measured[:, 0] *= cosine
-    sides = np.concatenate([_sides(item) for item in items])  # (target·2, 3)
-    covariance = head_std_m**2 * sides @ sides.T
-    for place, item in enumerate(items):
-        own = slice(2 * place, 2 * place + 2)
-        covariance[own, own] += item.position_std_m**2 * sides[own] @ sides[own].T
-    covariance += np.diag(measured.ravel() ** 2)
-    known = np.flatnonzero(np.isfinite(measured.ravel()))
-    if not np.all(np.diag(covariance)[known] > 0):
-        raise InputError("a measured angle has no uncertainty: give a standard deviation greater than 0")
-    return known, np.asarray(np.linalg.cholesky(covariance[np.ix_(known, known)]))
-
-
-def _whitened(
-    values: FloatArray,
-    items: list[Sighting],
-    start: Mounting,
-    solve: tuple[Angle, ...],
-    white: tuple[IntArray, FloatArray],
-) -> FloatArray:
-    """Residuals in standard deviations, independent of each other."""
-    mounting = replace(start, **dict(zip(solve, values.tolist(), strict=True)))
-    known, factor = white
-    return np.asarray(np.linalg.solve(factor, _angles_left(items, mounting).ravel()[known]), dtype=np.float64)
-
-
 def _solved(
     sightings: Sequence[Sighting],
     kept: list[int],
@@ -244,19 +166,19 @@ def _solved(
     from scipy.optimize import least_squares
 
     items = [sightings[number] for number in kept]
-    white = _whitening(sightings, kept, head_std_m)
+    white = whitening(sightings, kept, head_std_m)
     begin = np.array([getattr(start, angle) for angle in solve], dtype=np.float64)
     arguments = (items, start, solve, white)
     begin = begin + _turned(items, start, solve)
-    robust = least_squares(_whitened, begin, args=arguments, loss="soft_l1", x_scale=0.1)
-    exact = least_squares(_whitened, robust.x, args=arguments, x_scale=0.1, xtol=1e-12, ftol=1e-12)
+    robust = least_squares(whitened, begin, args=arguments, loss="soft_l1", x_scale=0.1)
+    exact = least_squares(whitened, robust.x, args=arguments, x_scale=0.1, xtol=1e-12, ftol=1e-12)
     slopes = np.asarray(exact.jac, dtype=np.float64)
     return np.asarray(exact.x), slopes.T @ slopes, float(2.0 * exact.cost)
 
 
 def _turned(items: list[Sighting], start: Mounting, solve: tuple[Angle, ...]) -> FloatArray:
     """A first turn about up [deg], the median of all, so that a head set up anyhow is found as well."""
-    across = _angles_left(items, start)[:, 0]
+    across = angles_left(items, start)[:, 0]
     first = np.zeros(len(solve))
     for angle in ("azimuth_offset_deg", "heading_deg"):
         if angle in solve:
@@ -283,69 +205,6 @@ def _refuse_undetermined(
         )
 
 
-def undetermined(
-    sightings: Sequence[Sighting],
-    *,
-    start: Mounting | None = None,
-    solve: tuple[Angle, ...] = ANGLES,
-    head_std_m: float = 0.0,
-) -> tuple[Angle, ...]:
-    """Angles that targets leave open: empty where they determine all.
-
-    Examples
-    --------
-    >>> def at(name, azimuth_deg):
-    ...     return Sighting(name, 900 * unit_vector(azimuth_deg, 3.0), azimuth_deg, 3.0, 900.0, .01, .01, .1, .1)
-    >>> undetermined([at("a", 10.0), at("b", 130.0), at("c", 250.0)])
-    ()
-    >>> undetermined([at("a", 0.0), at("b", 0.0), at("c", 180.0)])
-    ('roll_deg',)
-    """
-    if not sightings:
-        return solve
-    stds = predicted_std_deg(sightings, start=start, solve=solve, head_std_m=head_std_m)
-    factor = _whitening(sightings, list(range(len(sightings))), head_std_m)[1]
-    measured_deg = float(np.linalg.norm(factor, axis=1).min())
-    limit_deg = WEAKENING * measured_deg
-    return tuple(angle for angle, std in zip(solve, stds, strict=True) if not std <= limit_deg)
-
-
-def predicted_std_deg(
-    sightings: Sequence[Sighting],
-    *,
-    start: Mounting | None = None,
-    solve: tuple[Angle, ...] = ANGLES,
-    head_std_m: float = 0.0,
-) -> FloatArray:
-    """(angle,) standard deviation [deg] that targets would give each angle; infinite where they tell nothing.
-
-    Needs no measurement: head angles that are only expected will do.
-    """
-    slopes = design(sightings, start=start or Mounting(), solve=solve, head_std_m=head_std_m)
-    _, size, turn = np.linalg.svd(slopes, full_matrices=True)
-    full = np.zeros(len(solve))
-    full[: size.size] = size
-    sound = full > RANK_SHARE * full.max()
-    variance = (turn[sound].T ** 2 / full[sound] ** 2).sum(axis=1)
-    lost = (turn[~sound] ** 2).sum(axis=0) > RANK_SHARE
-    return np.asarray(np.where(lost, np.inf, np.sqrt(variance)))
-
-
-def design(
-    sightings: Sequence[Sighting], *, start: Mounting, solve: tuple[Angle, ...], head_std_m: float
-) -> FloatArray:
-    """(known angle, solved angle) derivatives of the whitened residuals [1/deg]: what targets tell of what."""
-    white = _whitening(sightings, list(range(len(sightings))), head_std_m)
-    begin = np.array([getattr(start, angle) for angle in solve], dtype=np.float64)
-    small = 1e-4
-    columns = [
-        _whitened(begin + small * unit, list(sightings), start, solve, white)
-        - _whitened(begin - small * unit, list(sightings), start, solve, white)
-        for unit in np.eye(len(solve))
-    ]
-    return np.asarray(np.stack(columns, axis=1) / (2.0 * small))
-
-
 def _chance(chi_square: float, freedom: int) -> float:
     """How often good data have residuals as large; 1 where nothing is left over to tell."""
     from scipy.special import chdtrc
@@ -367,7 +226,7 @@ def _worst(
         left = [sightings[other] for other in others]
         if undetermined(left, start=start, solve=solve, head_std_m=head_std_m):
             continue
-        freedom = _whitening(sightings, others, head_std_m)[0].size - len(solve)
+        freedom = whitening(sightings, others, head_std_m)[0].size - len(solve)
         if freedom > 0:
             chi_square = _solved(sightings, others, start, solve, head_std_m)[2]
             agreed.append((_chance(chi_square, freedom), number))
@@ -399,7 +258,7 @@ def _range_offset(
 
 
 def _residual(item: Sighting, mounting: Mounting, head_std_m: float, outlier: bool) -> Residual:
-    across, upward = _angles_left([item], mounting)[0]
+    across, upward = angles_left([item], mounting)[0]
     beam = beam_to(item.enu_m)
     cosine = float(np.cos(np.deg2rad(beam.elevation_deg)))
     place_deg = float(np.rad2deg(np.hypot(item.position_std_m, head_std_m) / beam.range_m))

@@ -14,7 +14,8 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.gates import Probe
-from reconstruct.correlation import Correlation
+from reconstruct.correlation import Correlation, correlation
+from reconstruct.spectra import Turbulence
 
 # Beyond that many integral lengths one place a patch is enough: the difference is under 1e-4 of the variance.
 DISTANT_LENGTHS = {"von-karman": 4.0, "kaimal": 8.0, "mann": 8.0}
@@ -32,17 +33,36 @@ OVERLAP_NODES = (10, 8)  # on each side, along the first and the second beam: ri
 SHALLOW = 0.05  # sine squared of the crossing angle under which two beams are as near all along a probe
 PULSE_REACH = 3.5  # standard deviations of the pulse beyond the window, where the probe ends
 # Probe and sweep of a ray with itself, graded towards no offset: to 1e-3 of the variance, and 1e-4 for
-# lidars that cross.
+# lidars that cross; to 5e-3 of what is left where eddies are small against the patch.
 SELF_NODES, CROSSING_SELF_NODES = (8, 5), (16, 8)
+# In a larger patch the nodes end that many integral lengths off, where two places know nothing of each other
+# (von Karman: exp(-9)): what a patch of size A leaves then falls like length over A, as it has to.
+SELF_LENGTHS = {"von-karman": 12.0, "kaimal": 25.0, "mann": 30.0}
 OVERLAP_REACH = 4.0  # standard deviations beyond the windows, where the offset of two places in a probe ends
 CHUNK_PLACES = 2**13  # correlations evaluated at once: their arrays stay in the processor's cache
 _FINE_PLACES = FIRST_NODES[0] * FIRST_NODES[1] * SECOND_NODES[0] * SECOND_NODES[1]
 _POINT_PLACES = 2 * OVERLAP_NODES[0] * 2
 _OVERLAP_PLACES = 2 * OVERLAP_NODES[1] * 2 * _POINT_PLACES
 _UNIT_STD = np.sqrt(1.0 / 12.0)  # of a uniform variable of width 1
-# Two places for each of four offsets (two probes, two sweeps): eight of the sixteen corners, exact to third
-# degree.
-_CORNERS = np.array([[a, b, c, a * b * c] for a in (-1.0, 1.0) for b in (-1.0, 1.0) for c in (-1.0, 1.0)])
+# Two places for each of four offsets (two probes, two sweeps) from the middle: eight of the sixteen corners,
+# exact to third degree; and four for a probe and a sweep against a point.
+_SIDES = (-1.0, 1.0)
+_CORNERS = np.array([[1.0, a, b, c, a * b * c] for a in _SIDES for b in _SIDES for c in _SIDES])
+_POINT_CORNERS = np.array([[1.0, a, b] for a in _SIDES for b in _SIDES])
+
+
+class Footprint(NamedTuple):
+    """What a ray covers around the middle of its patch; components first."""
+
+    beam: FloatArray  # (3, ray) unit vector of the beam
+    sweep_m: FloatArray  # (3, ray) from the start of the ray to its end
+    lidar: IntArray  # (ray,)
+
+    def take(self, index: IntArray) -> "Footprint":
+        """Footprints of some rays, in that order."""
+        return Footprint(
+            self.beam.take(index, axis=1), self.sweep_m.take(index, axis=1), self.lidar.take(index)
+        )
 
 
 class Patches(NamedTuple):
@@ -53,14 +73,14 @@ class Patches(NamedTuple):
     sweep_m: FloatArray  # (3, ray) from the start of the ray to its end
     lidar: IntArray  # (ray,)
 
+    @property
+    def footprint(self) -> Footprint:
+        """The patches without their places."""
+        return Footprint(self.beam, self.sweep_m, self.lidar)
+
     def take(self, index: IntArray) -> "Patches":
         """Patches of some rays, in that order."""
-        return Patches(
-            self.centre_m.take(index, axis=1),
-            self.beam.take(index, axis=1),
-            self.sweep_m.take(index, axis=1),
-            self.lidar.take(index),
-        )
+        return Patches(self.centre_m.take(index, axis=1), *self.footprint.take(index))
 
 
 class Air(NamedTuple):
@@ -69,13 +89,22 @@ class Air(NamedTuple):
     tensor: Correlation
     probes: tuple[Probe, ...]
     distant_m: float
+    self_m: float
+
+    @classmethod
+    def of(cls, turbulence: Turbulence, probes: tuple[Probe, ...]) -> "Air":
+        """The air of a turbulence model as these probes average it."""
+        length_m, model = turbulence.length_m, turbulence.model
+        return cls(
+            correlation(turbulence), probes, DISTANT_LENGTHS[model] * length_m, SELF_LENGTHS[model] * length_m
+        )
 
 
 def pair_correlations(
     air: Air, first: Patches, second: Patches, moved_m: FloatArray, *, to_point: bool = False
 ) -> FloatArray:
-    """Correlations (lag, pair) of pairs of patches, the second of which has moved upwind by (3, lag, 1)
-    metres.
+    """Correlations (lag, pair) of pairs of patches, the second of which has moved upwind by (3, lag, pair)
+    metres, or by (3, lag, 1).
 
     Overlapping pairs get nodes that crowd where they touch, near ones a fine rule, far ones two places for
     each offset, distant ones one place.
@@ -87,23 +116,25 @@ def pair_correlations(
     overlapping = near if len(air.probes) > 1 else square < (OVERLAP_SPREADS * spread) ** 2
     distant = ~near & (square > air.distant_m**2)
     out = np.empty(near.shape)
+    ours, theirs = first.footprint, second.footprint
+    flat, whole = apart.reshape(3, -1), out.reshape(-1)
     for mask, rule, places in (
         (overlapping, _overlapping, _POINT_PLACES if to_point else _OVERLAP_PLACES),
         (near & ~overlapping, _fine, _FINE_PLACES),
         (~(near | distant), _coarse, len(_CORNERS)),
         (distant, _single, 1),
     ):
-        lag, pair = np.nonzero(mask)
+        where = np.flatnonzero(mask)
         step = max(1, CHUNK_PLACES // places)
-        for start in range(0, len(pair), step):
-            part = slice(start, start + step)
-            one, two = first.take(pair[part]), second.take(pair[part])
-            distance = apart[:, lag[part], pair[part]]
-            out[lag[part], pair[part]] = rule(air, one, two, distance, to_point)
+        for start in range(0, len(where), step):
+            part = where[start : start + step]
+            pair = part % mask.shape[1]
+            distance = flat.take(part, axis=1)
+            whole[part] = rule(air, ours.take(pair), theirs.take(pair), distance, to_point)
     return out
 
 
-def _single(air: Air, first: Patches, second: Patches, apart_m: FloatArray, to_point: bool) -> FloatArray:
+def _single(air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool) -> FloatArray:
     """Correlation of the middles of two patches."""
     del to_point  # a point has no other middle
     return air.tensor(apart_m, first.beam, second.beam)
@@ -118,24 +149,19 @@ def _spread(probes: Sequence[Probe], first: Patches, second: Patches, to_point: 
     return np.asarray(np.sqrt(square))
 
 
-def _coarse(air: Air, first: Patches, second: Patches, apart_m: FloatArray, to_point: bool) -> FloatArray:
+def _coarse(air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool) -> FloatArray:
     """Average over two patches that are far from each other: right to the third degree in the offsets."""
     std = np.array([probe.std_m for probe in air.probes])
-    corners = _CORNERS.T[:, :, None]
-    shift = (
-        corners[0] * (first.beam * std[first.lidar])[:, None]
-        + corners[1] * (first.sweep_m * _UNIT_STD)[:, None]
-    )
-    if to_point:
-        shift, corners = shift[:, ::2], corners[:, ::2]
-    else:
-        shift = shift - corners[2] * (second.beam * std[second.lidar])[:, None]
-        shift -= corners[3] * (second.sweep_m * _UNIT_STD)[:, None]
-    values = air.tensor(apart_m[:, None] + shift, first.beam[:, None], second.beam[:, None])
-    return np.asarray(np.mean(values, axis=0))
+    sides = [apart_m, first.beam * std[first.lidar], first.sweep_m * _UNIT_STD]
+    if not to_point:
+        sides += [second.beam * std[second.lidar], second.sweep_m * _UNIT_STD]
+    corners = _POINT_CORNERS if to_point else _CORNERS
+    places = corners @ np.stack(sides, axis=1)  # (3, corner, pair)
+    values = air.tensor(places, first.beam[:, None], second.beam[:, None])
+    return np.asarray(np.add.reduce(values, axis=0) / len(corners))
 
 
-def _fine(air: Air, first: Patches, second: Patches, apart_m: FloatArray, to_point: bool) -> FloatArray:
+def _fine(air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool) -> FloatArray:
     """Average over two patches that are near each other or overlap, by unequal Gauss rules."""
     one, weight_one = _places(air.probes, first, FIRST_NODES)
     if to_point:
@@ -148,7 +174,7 @@ def _fine(air: Air, first: Patches, second: Patches, apart_m: FloatArray, to_poi
 
 
 def _overlapping(
-    air: Air, first: Patches, second: Patches, apart_m: FloatArray, to_point: bool
+    air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool
 ) -> FloatArray:
     """Average over two patches that overlap: along the first beam, nodes crowd where the second place is
     nearest; along the second, they part where the two beams are nearest.
@@ -177,7 +203,7 @@ def _overlapping(
 
 
 def _between_sweeps(
-    first: Patches, second: Patches, apart_m: FloatArray, to_point: bool
+    first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Separations (3, times, pair) of the gates at two times in each sweep, and weights (times, 1)."""
     turn, share = _legendre(2)
@@ -189,7 +215,7 @@ def _between_sweeps(
     return both.reshape(3, -1, apart_m.shape[1]), np.outer(share, share).reshape(-1, 1) / 4
 
 
-def _nearest_of_second(first: Patches, second: Patches, apart_m: FloatArray) -> FloatArray:
+def _nearest_of_second(first: Footprint, second: Footprint, apart_m: FloatArray) -> FloatArray:
     """Offset (times, pair) along the second beam where the first one passes nearest [m].
 
     It is 0 for beams so nearly parallel that it makes no difference within a probe.
@@ -217,7 +243,7 @@ def _split(
 
 
 def _places(
-    probes: Sequence[Probe], patches: Patches, counts: tuple[int, int]
+    probes: Sequence[Probe], patches: Footprint, counts: tuple[int, int]
 ) -> tuple[FloatArray, FloatArray]:
     """Offsets (3, node, ray) and weights (node, ray) of a Gauss rule over each patch."""
     rules = [probe.nodes(counts[0]) for probe in probes]
@@ -231,41 +257,59 @@ def _places(
 
 
 def self_correlations(air: Air, patches: Patches) -> FloatArray:
-    """Share (ray,) that probe and sweep leave of the variance of a point."""
-    nodes = SELF_NODES if len(air.probes) == 1 else CROSSING_SELF_NODES
-    rules = [_self_rule(probe, nodes) for probe in air.probes]
-    offset = np.stack([rule[0] for rule in rules])[patches.lidar].T
-    weight = np.stack([rule[1] for rule in rules])[patches.lidar].T
-    turn, share = rules[0][2], rules[0][3]
-    places = offset[:, None] * patches.beam[:, None, None] + turn[:, None] * patches.sweep_m[:, None, None]
-    values = air.tensor(places, patches.beam[:, None, None], patches.beam[:, None, None])
-    return np.asarray(np.einsum("ap,b,abp->p", weight, share, values))
+    """Share (ray,) that probe and sweep leave of the variance of a point.
+
+    The offset of two independent places has the autocorrelation of the weighting along the beam; of two times
+    in the sweep, a triangle. The correlation falls like r^(2/3) at first, so the nodes crowd near 0. Positive
+    offsets along the beam stand for both signs, since turning both signs changes nothing.
+    """
+    counts = SELF_NODES if len(air.probes) == 1 else CROSSING_SELF_NODES
+    beside, part, weight = _across_self(air, patches, counts[1])
+    out = np.empty(len(patches.lidar))
+    for lidar, probe in enumerate(air.probes):
+        mine = np.flatnonzero(patches.lidar == lidar)
+        along, along_weight = _along_self(probe, counts[0], air.self_m, beside[mine])
+        beam, sweep = patches.beam[:, mine], patches.sweep_m[:, mine]
+        places = (along * beam[:, None])[:, :, None] + (part[:, mine] * sweep[:, None])[:, None]
+        values = air.tensor(places, beam[:, None, None], beam[:, None, None])
+        out[mine] = np.einsum("ap,bp,abp->p", along_weight, weight[:, mine], values)
+    return out
+
+
+def _across_self(air: Air, patches: Patches, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Largest offset (ray,) along the beam that comes with a sweep [m]; parts (node, ray) of the sweep
+    between two times in it, either sign, and their weights.
+    """
+    along = np.abs(np.einsum("cr,cr->r", patches.sweep_m, patches.beam))
+    across = np.sqrt(np.clip(np.einsum("cr,cr->r", patches.sweep_m, patches.sweep_m) - along**2, 0.0, None))
+    end = np.minimum(1.0, air.self_m / np.maximum(across, air.self_m))
+    node, share = _graded(count, 2)
+    part = end * node[:, None]
+    weight = end * share[:, None] * (1 - part)
+    return end * along, np.concatenate([-part[::-1], part]), np.concatenate([weight[::-1], weight])
+
+
+def _along_self(
+    probe: Probe, count: int, reach_m: float, beside_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Offsets (node, ray) along the beam [m] between two places of one probe, and their weights, both signs."""
+    offset, density, mass = _overlap(probe)
+    end = np.minimum(offset[-1], reach_m + beside_m)
+    node, share = _graded(count, 2)
+    along = end * node[:, None]
+    weight = share[:, None] * np.interp(along, offset, density)
+    return along, weight * (np.interp(end, offset, mass) / np.sum(weight, axis=0))
 
 
 @lru_cache(maxsize=64)
-def _self_rule(probe: Probe, nodes: tuple[int, int]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Offsets along the beam and shares of the sweep between two places of one patch, with their weights.
-
-    The offset of two independent places has the autocorrelation of the weighting; of two times in the sweep,
-    a triangle. The correlation falls like r^(2/3) at first, so the nodes crowd near 0 (squared Gauss nodes).
-    Positive offsets stand for both signs, since turning both signs changes nothing.
-    """
+def _overlap(probe: Probe) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Offsets from 0 up [m], the autocorrelation of the weighting there, and the share of pairs of places closer."""
     reach = probe.window_m + OVERLAP_REACH * np.sqrt(2) * probe.pulse_std_m
-    fine = np.linspace(-1.1 * reach, 1.1 * reach, 4001)
+    fine = np.linspace(-reach, reach, 4001)
     weight = probe.weight(fine)
-    overlap = np.convolve(weight, weight, mode="same") * (fine[1] - fine[0])
-    along, along_weight = _graded(nodes[0], 2)
-    density = np.interp(reach * along, fine, overlap)
-    along_weight = along_weight * density / np.sum(along_weight * density)
-    across, across_weight = _graded(nodes[1], 2)
-    triangle = across_weight * (1 - across)
-    triangle = 0.5 * triangle / np.sum(triangle)
-    return (
-        reach * along,
-        along_weight,
-        np.concatenate([-across[::-1], across]),
-        np.concatenate([triangle[::-1], triangle]),
-    )
+    density = np.convolve(weight, weight, mode="same")[2000:]
+    mass = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    return fine[2000:], density, mass / mass[-1]
 
 
 @lru_cache(maxsize=16)

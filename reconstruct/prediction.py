@@ -11,8 +11,8 @@ import numpy as np
 from geometry.arrays import ArrayLike, FloatArray
 from geometry.errors import InputError
 from reconstruct.moments import WindMoments, wind_moments
+from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
-from reconstruct.retrieval import condition, gain, rows
 from reconstruct.uncertainty import ErrorSources, mean_errors_mps, wind_covariance_by_source
 from reconstruct.wind import WindState
 
@@ -146,14 +146,14 @@ def predict_noise(
         raise InputError(
             f"the noise of the radial speed is {noise.tolist()} m/s: numbers from 0 up are needed"
         )
-    matrix = rows(rays.azimuth_deg, rays.elevation_deg)
-    spread = gain(matrix, weights) * noise
+    fitted = ray_fit(rays, weights)
+    spread = fitted.gain * noise
     return scan_prediction(
         "noise",
         wind,
         covariance_m2s2=spread @ spread.T,
         mean_error_mps=np.zeros(2),
-        condition=float(condition(matrix, weights)),
+        condition=float(fitted.condition),
     )
 
 
@@ -166,7 +166,7 @@ def predict_linear(
 ) -> ScanPrediction:
     """Error of one scan from every source, propagated to first order through the matrix of the actual fit.
 
-    The covariance is P = G C Gᵀ with C of `ray_covariance` (JCGM 100:2008, equation 16); the mean error is
+    The covariance is P = G C Gᵀ with C of `ray_covariance` (JCGM 102:2011, 6.2.1.3); the mean error is
     what vertical wind, lateral gradient and shear put into a fit that knows none of them. A clock difference
     does nothing here: it acts through turbulence.
 
@@ -198,8 +198,7 @@ def predict_linear(
     >>> round(linear.speed_std_mps, 4), round(linear.direction_std_deg, 4)
     (0.0451, 0.0792)
     """
-    matrix = rows(rays.azimuth_deg, rays.elevation_deg)
-    fit = gain(matrix, weights)
+    fit, conditioned = ray_fit(rays, weights)
     parts = wind_covariance_by_source(fit, rays, wind, sources)
     known = np.all(np.isfinite(fit))
     return scan_prediction(
@@ -207,7 +206,7 @@ def predict_linear(
         wind,
         covariance_m2s2=sum(parts.values(), np.full((2, 2), 0.0 if known else np.nan)),
         mean_error_mps=np.sum(list(mean_errors_mps(fit, rays, wind).values()), axis=0),
-        condition=float(condition(matrix, weights)),
+        condition=float(conditioned),
     )
 
 

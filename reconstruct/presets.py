@@ -14,7 +14,7 @@ from reconstruct.spectra import EDDY_LENGTH_RATIO, Turbulence, TurbulenceModel
 Stability = Literal["very unstable", "unstable", "neutral", "stable", "very stable"]
 
 # One over the Obukhov length [1/m], near the middle of the classes of Gryning et al. (2007), Boundary-Layer
-# Meteorol. 124, 251-268, doi:10.1007/s10546-007-9166-9, Table 2.
+# Meteorol. 124, 251-268, doi:10.1007/s10546-007-9166-9 (of its seven, the two near neutral are left out).
 INVERSE_OBUKHOV_PER_M: dict[Stability, float] = {
     "very unstable": -1 / 75,
     "unstable": -1 / 150,
@@ -23,7 +23,7 @@ INVERSE_OBUKHOV_PER_M: dict[Stability, float] = {
     "very stable": 1 / 30,
 }
 KARMAN = 0.4
-KOLMOGOROV = 0.55  # of the longitudinal spectrum over k > 0: Kaimal & Finnigan (1994), chapter 2
+KOLMOGOROV = 0.55  # of the longitudinal spectrum over k > 0: Kaimal & Finnigan (1994); 18/55 of the 1.7 of the energy spectrum
 
 
 def stability_turbulence(
@@ -65,8 +65,9 @@ def stability_turbulence(
     Notes
     -----
     u* = 0.4 V / (ln(z/z0) - psi), psi of Dyer (1974), Boundary-Layer Meteorol. 7, 363-372,
-    doi:10.1007/BF00240838; sigma_u = u* (12 - 0.5 z_i/L)^(1/3), 12^(1/3) in stable air: Panofsky et al.
-    (1977), Boundary-Layer Meteorol. 11, 355-361, doi:10.1007/BF02186086; dissipation u*³ phi/(0.4 z), phi =
+    doi:10.1007/BF00240838; sigma_u = u* (12 - 0.5 z_i/L)^(1/3): Panofsky et al. (1977),
+    Boundary-Layer Meteorol. 11, 355-361, doi:10.1007/BF02186086, for unstable air; its neutral 12^(1/3) is
+    kept in stable air; dissipation u*³ phi/(0.4 z), phi =
     (1 + 0.5 |z/L|^(2/3))^(3/2) or 1 + 5 z/L: Kaimal & Finnigan (1994), Atmospheric Boundary Layer Flows,
     chapter 1. The length gives the inertial subrange of that dissipation.
 

@@ -1,6 +1,7 @@
 """The rays that one retrieval combines into one wind vector: a sector scan, or the stares of two or three lidars."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -58,6 +59,7 @@ class Rays:
     sweep_s: float | None = (
         None  # of the whole pass, start to end, rays left out included; default: these rays
     )
+    columns: Literal[2, 3] = 2  # of the fit: u and v, or w too
 
     def __post_init__(self) -> None:
         shapes = {name: np.shape(getattr(self, name))[:1] for name in (*_FLOATS, "lidar")}

@@ -4,21 +4,26 @@ pairs.
 Everything here is in the frame x downwind, y left. Passes are the two directions of a back-and-forth scan.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from reconstruct.covariance import lag_covariance, point_covariance, target_covariance
+from reconstruct.covariance import lag_covariances, point_covariance, target_covariances
 from reconstruct.joint import Speed, expand, speed_covariance
+from reconstruct.lags import Lags, pair_counts, select_lags
+from reconstruct.periods import scans_in
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.wind import WindState
 
-# Correlations beyond that many integral lengths are left out: 1e-3 of the variance, 1e-2 for the long tails
-# of Mann.
-REACH_LENGTHS = {"von-karman": 8.0, "kaimal": 25.0, "mann": 30.0}
+# Correlations beyond that many integral lengths are left out: 1e-5 of a variance that is averaged along the wind,
+# 1e-2 for the long tails of Mann. The lateral correlation goes negative and comes back slowly: at 8 lengths the rest
+# of its integral is still -1.2 %.
+REACH_LENGTHS = {"von-karman": 16.0, "kaimal": 25.0, "mann": 30.0}
 TARGET_TIMES = 81  # between scan and target: crowded around the middle of the scan
+CROWDING = 4.0  # the middle third of them falls within 5 % of the reach
 POINT_TIMES = 48  # between the target and itself: crowded towards 0
 
 
@@ -26,16 +31,21 @@ class Period(NamedTuple):
     """What is averaged, and for how long."""
 
     rays: Rays
-    wind: WindState
+    winds: Sequence[WindState]  # of one speed
     turbulence: Turbulence
     averaging_s: float
     scan_share: float
     sweep: bool
 
     @property
+    def speed_mps(self) -> float:
+        """Speed of all winds [m/s]."""
+        return self.winds[0].speed_mps
+
+    @property
     def scans(self) -> int:
         """Scans that fit into the averaging time."""
-        return int(self.averaging_s / self.rays.period_s + 1e-9)
+        return scans_in(self.rays.period_s, self.averaging_s)
 
     @property
     def valid_scans(self) -> float:
@@ -50,25 +60,36 @@ class Period(NamedTuple):
     @property
     def pass_share(self) -> FloatArray:
         """(pass,) share of the scans that run each way."""
-        return _pair_counts(np.arange(1), self.scans, self.passes)[:, 0] / self.scans
+        return pair_counts(np.arange(1), self.scans, self.passes)[:, 0] / self.scans
 
     @property
     def reach_s(self) -> float:
         """Time after which nothing is left of the turbulence that was there [s]."""
         length = REACH_LENGTHS[self.turbulence.model] * self.turbulence.length_m
-        return length / max(self.wind.speed_mps, 1e-9)
+        return length / max(self.speed_mps, 1e-9)
 
     @property
-    def lags(self) -> IntArray:
-        """Lags between scans [number of scans] that are correlated."""
-        if self.turbulence.std_mps(self.wind.speed_mps) == 0:
-            return np.arange(1)
-        last = (self.reach_s + float(np.ptp(self.rays.time_s))) / self.rays.period_s
-        return np.arange(min(self.scans, int(last) + 2))
+    def lags(self) -> Lags:
+        """Lags between scans that are worked out, and for how many pairs of scans each of them stands."""
+        rays = self.rays
+        if self.turbulence.std_mps(self.speed_mps) == 0:
+            return select_lags(1, self.scans, self.passes, near=0.0, finest=1.0)
+        duration = float(np.ptp(rays.time_s))
+        last = (self.reach_s + duration) / rays.period_s
+        per_scan_m = self.speed_mps * rays.period_s
+        near = float(np.linalg.norm(np.ptp(rays.centre_m, axis=0))) + self.speed_mps * duration
+        finest = min(probe.std_m for probe in rays.probes)
+        return select_lags(
+            min(self.scans, int(last) + 2),
+            self.scans,
+            self.passes,
+            near=near / per_scan_m,
+            finest=finest / per_scan_m,
+        )
 
 
 class ScanMean(NamedTuple):
-    """Mean of the scans of a period; (...) are the sector sizes."""
+    """Mean of the scans of a period; (...) are the winds and the sector sizes."""
 
     lidar: Speed  # (..., pass) of one scan
     mean_mps: FloatArray  # (...) of the scans' speeds
@@ -95,21 +116,21 @@ def scan_mean(
     period
         What is averaged.
     matrix
-        (..., 1, 2, ray) fits.
+        (wind, size, 1, 2, ray) fits.
     vector_mps
-        (..., 2) expected vector.
+        (wind, size, 2) expected vector.
     random, persistent
-        (..., 1, 2, 2) covariance of the vector from errors drawn anew in each scan, and from those that stay
+        (wind, size, 1, 2, 2) covariance of the vector from errors drawn anew in each scan, and from those that stay
         [m²/s²].
     """
     lags = period.lags
-    within = lag_covariance(period.rays, period.wind, period.turbulence, lags, sweep=period.sweep)
-    between = through(matrix[..., None, :, :], within)  # (..., pass, lag, 2, 2)
+    within = lag_covariances(period.rays, period.winds, period.turbulence, lags.steps, sweep=period.sweep)
+    between = through(matrix[..., None, :, :], within[:, None])  # (wind, size, pass, lag, 2, 2)
     lasting = np.broadcast_to(persistent, between[..., 0, :, :].shape)
     between += lasting[..., None, :, :]
     between[..., 0, :, :] += random
     lidar = expand(vector_mps[..., None, :], between[..., 0, :, :])
-    values = _speeds_between(lidar, between, lags)
+    values = _speeds_between(lidar, between, lags.steps)
     beyond = speed_covariance(lidar, lidar, lasting)
     vectors = 0.5 * (between + np.swapaxes(between, -1, -2))
     covariance = _mean_of_pairs(
@@ -124,23 +145,23 @@ def scan_mean(
 
 
 def point_mean(period: Period) -> PointMean:
-    """Mean at the target: 2/T times the integral of (1 - t/T) times the covariance at lag t."""
+    """Mean at the target, the same for all winds: 2/T times the integral of (1 - t/T) times the covariance at lag t."""
     node, weight = np.polynomial.legendre.leggauss(POINT_TIMES)
     half = 0.5 * (node + 1)
     end = min(period.averaging_s, period.reach_s)
     times, weights = end * half**3, 1.5 * end * weight * half**2
     weights = 2 / period.averaging_s * weights * (1 - times / period.averaging_s)
-    covariance = point_covariance(period.wind, period.turbulence, np.append(times, 0.0))
-    speed = expand(np.array([period.wind.speed_mps, 0.0]), np.diag(covariance[-1]))
+    covariance = point_covariance(period.winds[0], period.turbulence, np.append(times, 0.0))
+    speed = expand(np.array([period.speed_mps, 0.0]), np.diag(covariance[-1]))
     values = speed_covariance(speed, speed, covariance[:-1, :, None] * np.eye(2))
     return PointMean(speed, speed.mean_mps, np.asarray(weights @ values), weights @ covariance[:-1])
 
 
 def scan_with_target(period: Period, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Covariances (..., pass, time, 2, 2) of a scan with the target, and weights (pass, time)."""
+    """Covariances (wind, size, pass, time, 2, 2) of a scan with the target, and weights (pass, time)."""
     times, weight = _times(period)
-    seen = target_covariance(period.rays, period.wind, period.turbulence, times, sweep=period.sweep)
-    return np.asarray(matrix[..., None, :, :] @ seen), weight
+    seen = target_covariances(period.rays, period.winds, period.turbulence, times, sweep=period.sweep)
+    return np.asarray(matrix[..., None, :, :] @ seen[:, None]), weight
 
 
 def through(matrix: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -153,10 +174,10 @@ def _times(period: Period) -> tuple[FloatArray, FloatArray]:
     rays, averaging = period.rays, period.averaging_s
     middle = 0.5 * float(np.min(rays.time_s) + np.max(rays.time_s))
     reach = min(averaging, period.reach_s + rays.period_s)
-    bend = 3.0  # the middle third of the times falls within 12 % of the reach
     node = np.linspace(-1.0, 1.0, TARGET_TIMES)
-    times = middle + reach * np.sinh(bend * node) / np.sinh(bend)
-    step = reach * bend * np.cosh(bend * node) / np.sinh(bend) * (node[1] - node[0])
+    scale = reach / np.sinh(CROWDING)
+    times = middle + scale * np.sinh(CROWDING * node)
+    step = scale * CROWDING * np.cosh(CROWDING * node) * (node[1] - node[0])
     starts = rays.period_s * np.arange(period.scans)
     inside = np.abs(starts[:, None] + times - 0.5 * averaging) <= 0.5 * averaging
     passes = period.passes
@@ -177,20 +198,14 @@ def _speeds_between(lidar: Speed, between: FloatArray, lags: IntArray) -> FloatA
     return values
 
 
-def _pair_counts(lags: IntArray, scans: int, passes: int) -> FloatArray:
-    """(pass, lag) how many pairs of scans start in that pass and are that far apart."""
-    starts = np.clip(scans - lags, 0, None)
-    return np.stack([(starts + passes - 1 - odd) // passes for odd in range(passes)]).astype(float)
-
-
-def _mean_of_pairs(each: FloatArray, beyond: FloatArray, lags: IntArray, period: Period) -> FloatArray:
+def _mean_of_pairs(each: FloatArray, beyond: FloatArray, lags: Lags, period: Period) -> FloatArray:
     """Variance of a mean of scans from covariances (..., pass, lag) and, beyond the last lag, (..., pass).
 
     Of N scans n are valid, any as likely as any other: the mean has 1/n of the variance of one scan and 1 -
     1/n of the mean covariance of two different ones.
     """
     scans, valid = period.scans, period.valid_scans
-    counts = _pair_counts(lags, scans, each.shape[-2])
+    counts = lags.pairs
     alone = np.einsum("p,...p->...", counts[:, 0], each[..., 0]) / scans
     if scans == 1:
         return np.asarray(alone)

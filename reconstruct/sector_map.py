@@ -1,6 +1,6 @@
 """The linear tier for one sector scan and very many places of its lidar."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -8,7 +8,6 @@ from geometry.arrays import ArrayLike, FloatArray
 from reconstruct import responses
 from reconstruct.beam_table import Criterion, condensed
 from reconstruct.climate import Climate
-from reconstruct.lidar_map import beam_view
 from reconstruct.retrieval import gain, rows
 from reconstruct.uncertainty import COMMON, ErrorSources
 from reconstruct.wind import WindState, uv_mps
@@ -104,7 +103,7 @@ def _variance(
         shear = state.shear_exponent * speed / state.height_m
         filled = [np.full(angle.shape, value) for value in (target[2], speed, shear)]
         with np.errstate(invalid="ignore", divide="ignore"):
-            view = beam_view(heads.T[:, None], [*ends, *filled], state)
+            view = _beam_view(heads.T[:, None], [*ends, *filled], state)
         along = np.stack([float(part) for part in uv_mps(1.0, state.from_deg)])
         across = np.array([-along[1], along[0]])
         if criterion != "direction":
@@ -138,3 +137,28 @@ def _projected(
             total += std**2 * (1.0 - correlation) * np.einsum("rc,rc->c", carried, carried)
             total += std**2 * correlation * np.square(carried.sum(axis=0))
     return np.asarray(total)
+
+
+def _beam_view(head: FloatArray, points: Sequence[FloatArray], wind: WindState) -> responses.View:
+    """Beams from a head (3, ...) to points: east, north, up [m], speed [m/s] and shear [1/s] there, which broadcast."""
+    east, north, up = (points[i] - head[i] for i in range(3))
+    level2 = east * east + north * north
+    level, distance = np.sqrt(level2), np.sqrt(level2 + up * up)
+    per_level, per_distance = 1 / level, 1 / distance
+    east, north, cosine = east * per_level, north * per_level, level * per_distance
+    u, v = (float(a) for a in uv_mps(1.0, wind.from_deg))
+    return responses.View(
+        sin_azimuth=east,
+        cos_azimuth=north,
+        sin_elevation=up * per_distance,
+        cos_elevation=cosine,
+        east=east * cosine,
+        north=north * cosine,
+        range_m=distance,
+        u_mps=u * points[3],
+        v_mps=v * points[3],
+        w_mps=wind.vertical_mps,
+        shear_per_s=(u * east + v * north) * cosine * points[4],
+        lateral_per_s=wind.lateral_gradient_per_s,
+        downwind=(u, v),
+    )

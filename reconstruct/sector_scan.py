@@ -16,7 +16,8 @@ def sector_wind(
 ) -> Retrieval:
     """Wind of one or many sector scans.
 
-    At zero elevation two columns are iVAP (Liang 2007, J. Atmos. Oceanic Technol. 24, 658-665).
+    At zero elevation two columns are iVAP (Liang 2007, J. Atmos. Oceanic Technol. 24, 658-665,
+    doi:10.1175/JTECH2047.1).
 
     Parameters
     ----------

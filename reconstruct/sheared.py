@@ -33,7 +33,7 @@ def sheared(gamma: float, mann_length_m: float) -> Callable[[FloatArray, FloatAr
     Notes
     -----
     R_ij(r) = sum over l, m of 4 pi (-1)^(l/2) Y_lm(r/|r|) integral of k² a_lm(k) j_l(k r) dk, a_lm the
-    coefficients of Phi_ij (Abramowitz & Stegun 1964, 10.1.47). Tensor: Mann (1994),
+    coefficients of Phi_ij (Rayleigh's expansion: NIST DLMF, section 10.60). Tensor: Mann (1994),
     doi:10.1017/S0022112094001886.
     """
     values = _table(gamma).values

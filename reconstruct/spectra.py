@@ -32,9 +32,9 @@ EDDY_LENGTH_RATIO: float = math.gamma(1 / 3) / (math.sqrt(math.pi) * math.gamma(
 # L^2)^(5/6).
 KAIMAL_LENGTH_RATIO: float = ((2 * math.pi * EDDY_LENGTH_RATIO) ** (5 / 3) / 6 ** (5 / 3)) ** 1.5
 MANN_GAMMA = 3.9  # shear distortion parameter, IEC 61400-1 ed. 4, Annex C
-KAIMAL_STD_RATIO = (1.0, 0.8, 0.5)  # of u, v, w to u: IEC 61400-1 ed. 4, Annex C
+KAIMAL_STD_RATIO = (1.0, 0.8, 0.5)  # of u, v, w to u: IEC 61400-1 ed. 4, Annex C.3
 KAIMAL_LENGTH_FACTOR = (1.0, 2.7 / 8.1, 0.66 / 8.1)  # same table: 8.1, 2.7 and 0.66 times the scale parameter
-COHERENCE_DECAY = 12.0  # IEC 61400-1 ed. 4, Annex C
+COHERENCE_DECAY = 12.0  # IEC 61400-1 ed. 4, Annex C.3
 COHERENCE_OFFSET = 0.12
 REFERENCE_INTENSITY: dict[str, float] = {
     "A+": 0.18,
@@ -142,7 +142,7 @@ def iec_turbulence(
     Notes
     -----
     IEC 61400-1 ed. 4: sigma_1 = I_ref (0.75 V + 5.6 m/s) (normal turbulence model); scale parameter
-    0.7 z up to 60 m, then 42 m; Kaimal length 8.1 times it (Annex C).
+    0.7 z up to 60 m, then 42 m; Kaimal length 8.1 times it (Annex C.3).
 
     Examples
     --------
@@ -184,7 +184,7 @@ def longitudinal_spectrum(turbulence: Turbulence, frequency_hz: ArrayLike, *, sp
     Notes
     -----
     von Kármán: S = 4 sigma² (L/V) / (1 + 70.8 (n L/V)²)^(5/6) (ESDU 85020), L the integral
-    length; Kaimal: S = 4 sigma² (L_k/V) / (1 + 6 n L_k/V)^(5/3) (IEC 61400-1 ed. 4, Annex C).
+    length; Kaimal: S = 4 sigma² (L_k/V) / (1 + 6 n L_k/V)^(5/3) (IEC 61400-1 ed. 4, Annex C.3).
 
     Examples
     --------
@@ -242,7 +242,8 @@ def spectral_tensor(turbulence: Turbulence, wavenumber_per_m: FloatArray) -> Ten
     Notes
     -----
     Isotropic: Phi_ij = E(k)/(4 pi k²) (delta_ij - k_i k_j/k²) with the von Kármán energy spectrum. Sheared:
-    Mann (1994), J. Fluid Mech. 273, 141-168, doi:10.1017/S0022112094001886, equations 3.18-3.22.
+    Mann (1994), J. Fluid Mech. 273, 141-168, doi:10.1017/S0022112094001886, the uniform-shear
+    model, with his C1, C2, zeta1 and zeta2.
 
     Examples
     --------
@@ -275,10 +276,10 @@ def sheared_tensor(gamma: float, k: FloatArray) -> Tensor:
     k30 = k3 + beta * k1
     level = k1 * k1 + k2 * k2
     start = level + k30 * k30
-    c1 = beta * k1**2 * (start - 2 * k30**2 + beta * k1 * k30) / (square * level)  # equation 3.16
+    c1 = beta * k1**2 * (start - 2 * k30**2 + beta * k1 * k30) / (square * level)  # Mann's C1
     turn = np.arctan2(beta * k1 * np.sqrt(level), start - k30 * k1 * beta)
-    c2 = k2 * start / level**1.5 * turn  # equation 3.17
-    z1, z2 = c1 - k2 / k1 * c2, k2 / k1 * c1 + c2  # equation 3.15
+    c2 = k2 * start / level**1.5 * turn  # his C2
+    z1, z2 = c1 - k2 / k1 * c2, k2 / k1 * c1 + c2  # his zeta1 and zeta2
     energy = energy_spectrum(np.sqrt(start)) / (4 * math.pi)
     both, mixed = energy / start**2, energy / (start * square)
     return Tensor(

@@ -15,6 +15,8 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError
+from reconstruct.duck import bounded_duck
+from reconstruct.losses import Loss, merged_losses
 from reconstruct.records import GATE_FIELDS, RAY_FIELDS, Records, sweeps_through
 
 if TYPE_CHECKING:
@@ -27,7 +29,8 @@ CHUNK_VALUES = 4_000_000
 _WHOLE = ("time_utc", "scan_id", "sweep_id")
 
 _SCHEMA = """
-CREATE TABLE IF NOT EXISTS block (block INTEGER, instrument VARCHAR, fields VARCHAR, notes VARCHAR);
+CREATE TABLE IF NOT EXISTS block (block INTEGER, instrument VARCHAR, fields VARCHAR, notes VARCHAR, losses VARCHAR);
+ALTER TABLE block ADD COLUMN IF NOT EXISTS losses VARCHAR;
 CREATE TABLE IF NOT EXISTS gate (block INTEGER, gate INTEGER, range_m DOUBLE);
 CREATE TABLE IF NOT EXISTS ray (block INTEGER, ray BIGINT, time_utc TIMESTAMP_NS, duration_s DOUBLE,
 azimuth_deg DOUBLE,
@@ -81,6 +84,7 @@ def write_store(path: Path, records: Records) -> None:
                 records, sweep_id=sweeps_through([tail, records])[tail.rays :] + int(tail.sweep_id[0])
             )
         _insert(connection, number, count, records)
+        _tell(connection, number, records)
         connection.execute("COMMIT")
 
 
@@ -123,7 +127,7 @@ def read_store(path: Path, *, instrument: str | None = None, range_m: float | No
 def store_chunks(
     path: Path, *, instrument: str | None = None, range_m: float | None = None, values: int = CHUNK_VALUES
 ) -> Iterator[Records]:
-    """Rays of one instrument in order, in chunks that end where a sweep ends.
+    """Rays of one instrument in order, in chunks that end where a sweep ends if one ends in them.
 
     Parameters
     ----------
@@ -133,11 +137,13 @@ def store_chunks(
     range_m : float, optional
         Only the gate nearest to this slant range [m].
     values : int
-        Radial speeds in a chunk, about; a sweep that is longer is given whole.
+        Radial speeds in a chunk, at the most. A sweep that is longer is cut: a stare is one that never ends.
+        Its parts keep its number.
 
     Yields
     ------
     Records
+        Sweeps are numbered through.
     """
     chosen = _choose(path, instrument)
     size = max(values // (1 if range_m is not None else max(chosen.gates, 1)), 1)
@@ -156,17 +162,14 @@ def _opened(path: Path, *, read_only: bool = True) -> "Iterator[duckdb.DuckDBPyC
     if read_only and not path.is_file():
         raise InputError(f"{path}: there is no such store")
     try:
-        connection = duckdb.connect(str(path), read_only=read_only)
-    except duckdb.Error as error:
+        with bounded_duck(path, read_only=read_only) as connection:
+            yield connection
+    except duckdb.CatalogException as error:
+        raise InputError(f"{path}: is a DuckDB file, but not a store of rays ({error})") from error
+    except (duckdb.IOException, duckdb.ConnectionException) as error:
         raise InputError(
             f"{path}: cannot be opened as a DuckDB store ({error}); one program at a time may write"
         ) from error
-    try:
-        yield connection
-    except duckdb.CatalogException as error:
-        raise InputError(f"{path}: is a DuckDB file, but not a store of rays ({error})") from error
-    finally:
-        connection.close()
 
 
 def _block_for(connection: "duckdb.DuckDBPyConnection", records: Records) -> int:
@@ -181,8 +184,9 @@ def _block_for(connection: "duckdb.DuckDBPyConnection", records: Records) -> int
         if len(ranges) == records.gates and np.allclose(ranges, records.range_m, rtol=0, atol=1e-3):
             return int(number)
     (number,) = connection.execute("SELECT coalesce(max(block), -1) + 1 FROM block").fetchall()[0]
-    notes = json.dumps(records.notes)
-    connection.execute("INSERT INTO block VALUES (?, ?, ?, ?)", [number, records.instrument, fields, notes])
+    connection.execute(
+        "INSERT INTO block VALUES (?, ?, ?, ?, ?)", [number, records.instrument, fields, "[]", "[]"]
+    )
     _insert_columns(
         connection,
         "gate",
@@ -209,6 +213,24 @@ def _insert(connection: "duckdb.DuckDBPyConnection", number: int, first: int, re
         _insert_columns(
             connection, "value", {"block": np.full(count * records.gates, number), **where, **columns}
         )
+
+
+def _tell(connection: "duckdb.DuckDBPyConnection", number: int, records: Records) -> None:
+    """Add what these records say of themselves to what the block says already."""
+    notes, losses = _told(connection, number)
+    notes = tuple(dict.fromkeys((*notes, *records.notes)))
+    losses = merged_losses((*losses, *records.losses)) if losses else records.losses
+    connection.execute(
+        "UPDATE block SET notes = ?, losses = ? WHERE block = ?",
+        [json.dumps(notes), json.dumps(losses), number],
+    )
+
+
+def _told(connection: "duckdb.DuckDBPyConnection", number: int) -> tuple[tuple[str, ...], tuple[Loss, ...]]:
+    """Notes and losses of a block; a store of an older version has no losses."""
+    row = connection.execute("SELECT * FROM block WHERE block = ?", [number]).fetchall()[0]
+    losses = json.loads(row[4] or "[]") if len(row) > 4 else []
+    return tuple(json.loads(row[3])), tuple(Loss(*loss) for loss in losses)
 
 
 def _insert_columns(connection: "duckdb.DuckDBPyConnection", table: str, columns: dict[str, Any]) -> None:
@@ -250,35 +272,23 @@ def _choose(path: Path, instrument: str | None) -> Block:
 
 
 def _sweep_end(connection: "duckdb.DuckDBPyConnection", block: Block, start: int, stop: int) -> int:
-    """Ray after the last whole sweep in a range of rays, or after the first sweep if it is longer than
-    that.
-    """
+    """Ray after the last whole sweep in a range of rays; the end of the range if no sweep ends there."""
     if stop >= block.rays:
         return block.rays
-    change = "(SELECT sweep_id FROM ray WHERE block = $1 AND ray = $2)"
-    begun = connection.execute(
-        f"SELECT min(ray) FROM ray WHERE block = $1 AND ray > $3 AND ray <= $2 AND sweep_id = {change}",
+    (begun,) = connection.execute(
+        "SELECT min(ray) FROM ray WHERE block = $1 AND ray > $3 AND ray <= $2 "
+        "AND sweep_id = (SELECT sweep_id FROM ray WHERE block = $1 AND ray = $2) "
+        "AND sweep_id <> (SELECT sweep_id FROM ray WHERE block = $1 AND ray = $3)",
         [block.number, stop, start],
-    ).fetchall()[0][0]
-    before = connection.execute(
-        "SELECT sweep_id FROM ray WHERE block = ? AND ray = ?", [block.number, start]
-    ).fetchall()[0][0]
-    at = connection.execute(
-        "SELECT sweep_id FROM ray WHERE block = ? AND ray = ?", [block.number, stop]
-    ).fetchall()[0][0]
-    if at != before and begun is not None:
-        return int(begun)
-    end = connection.execute(
-        "SELECT min(ray) FROM ray WHERE block = ? AND ray > ? AND sweep_id <> ?", [block.number, stop, before]
-    ).fetchall()[0][0]
-    return block.rays if end is None else int(end)
+    ).fetchall()[0]
+    return stop if begun is None else int(begun)
 
 
 def _read(
     connection: "duckdb.DuckDBPyConnection", block: Block, start: int, stop: int, range_m: float | None
 ) -> Records:
-    (fields_text, notes_text) = connection.execute(
-        "SELECT fields, notes FROM block WHERE block = ?", [block.number]
+    (fields_text,) = connection.execute(
+        "SELECT fields FROM block WHERE block = ?", [block.number]
     ).fetchall()[0]
     fields, ranges = json.loads(fields_text), _ranges(connection, block.number)
     where, chosen = [block.number, start, stop], ""
@@ -300,8 +310,10 @@ def _read(
     rays: dict[str, Any] = {
         name: column if name in _WHOLE else np.ma.filled(column, np.nan) for name, column in table.items()
     }
-    notes = tuple(json.loads(notes_text))
-    return Records(range_m=ranges, instrument=block.instrument, notes=notes, **rays, **grids)
+    notes, losses = _told(connection, block.number)
+    return Records(
+        range_m=ranges, instrument=block.instrument, notes=notes, losses=losses, **rays, **grids
+    )
 
 
 def _grid(values: FloatArray, cell: IntArray, shape: tuple[int, int]) -> FloatArray:

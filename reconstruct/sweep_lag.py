@@ -29,6 +29,11 @@ LARGEST_NOISE_MPS = 1.0
 #: Fewest sweeps: one between two of the other direction.
 LEAST_SWEEPS = 3
 
+#: Sweeps that are looked at: with 12 s a sweep the first forty minutes. The lead is the instrument's, it stays.
+MOST_SWEEPS = 201
+
+#: Parts that the jackknife leaves out, one at a time.
+MOST_BLOCKS = 20
 
 #: The slope of a profile is taken over this many rays to each side.
 SLOPE_RAYS = 3
@@ -41,7 +46,7 @@ class SweepLead(NamedTuple):
     """How far the stamps lead the rays."""
 
     lead_deg: float  # positive where the stamp is ahead in the direction of the sweep
-    std_deg: float  # from leaving pairs of sweeps out (jackknife); NaN with fewer than five sweeps
+    std_deg: float  # from leaving blocks of sweeps out (jackknife); NaN with fewer than five sweeps
     sweeps: int  # that took part
 
 
@@ -144,7 +149,7 @@ def estimate_lead(records: Records) -> SweepLead:
     Parameters
     ----------
     records : Records
-        A sector that is swept to and fro, three sweeps or more.
+        A sector that is swept to and fro, three sweeps or more; of more than 201 the first.
 
     Returns
     -------
@@ -167,7 +172,9 @@ def estimate_lead(records: Records) -> SweepLead:
         )
     sweeps = [sweep._replace(speed_mps=sweep.speed_mps[:, gates]) for sweep in sweeps]
     lead = _best(sweeps, weight[gates], step)
-    left_out = [sweeps[:i] + sweeps[i + 2 :] for i in range(0, len(sweeps) - 1, 2)]
+    # whole pairs are left out, so that what stays has as many sweeps of either direction
+    block = 2 * int(np.ceil((len(sweeps) // 2) / MOST_BLOCKS))
+    left_out = [sweeps[:i] + sweeps[i + block :] for i in range(0, len(sweeps) - 1, block)]
     spread = float("nan")
     if len(sweeps) >= LEAST_SWEEPS + 2:
         values = np.array([_best(some, weight[gates], step, near=lead) for some in left_out])
@@ -181,7 +188,7 @@ def _usable_sweeps(records: Records) -> tuple[list[_Sweep], float]:
     whole = max((len(rays) for rays in every), default=0)
     sweeps: list[_Sweep] = []
     for rays in every:
-        if len(rays) < max(5, LEAST_SHARE * whole):
+        if len(rays) < max(5, LEAST_SHARE * whole) or len(sweeps) == MOST_SWEEPS:
             continue
         azimuth = np.unwrap(records.azimuth_deg[rays], period=360.0)
         azimuth = azimuth - 360.0 * np.round((np.median(azimuth) - _middle(sweeps, azimuth)) / 360.0)

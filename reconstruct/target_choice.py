@@ -9,7 +9,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from geometry.head import Mounting
-from reconstruct.mounting_fit import ANGLES, Angle, Sighting, predicted_std_deg, undetermined
+from reconstruct.sightings import ANGLES, Angle, Sighting, predicted_std_deg, undetermined
 
 MAX_CANDIDATES = 12  # 220 sets of three
 

@@ -10,6 +10,7 @@ random errors (noise, pointing jitter) are drawn anew for every ray; persistent 
 calibration) are drawn once for the whole campaign.
 """
 
+from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -19,8 +20,10 @@ from geometry.errors import InputError
 from reconstruct.covariance import wind_frame
 from reconstruct.joint import expand, speed_covariance
 from reconstruct.moments import WindMoments, wind_moments
+from reconstruct.periods import TEN_MINUTES_S
+from reconstruct.ray_fit import ray_fit, ray_rows
 from reconstruct.rays import Rays
-from reconstruct.retrieval import gain, rows
+from reconstruct.retrieval import gain
 from reconstruct.scan_means import (
     Period,
     PointMean,
@@ -31,12 +34,14 @@ from reconstruct.scan_means import (
     through,
 )
 from reconstruct.spectra import Turbulence
-from reconstruct.thinning import thinned
+from reconstruct.thinning import MOST_RAYS, thinned
 from reconstruct.wind import WindState
 
 Reference = Literal["scalar", "vector"]
 
-AVERAGING_S = 600.0
+TOGETHER = (
+    2**14
+)  # pairs of rays of all winds that are worked out at once, for every lag: some tens of megabytes
 
 
 class TenMinute(NamedTuple):
@@ -99,7 +104,7 @@ def predict_ten_minute(
     persistent_m2s2: ArrayLike = 0.0,
     mean_error_mps: ArrayLike = (0.0, 0.0),
     reference: Reference = "scalar",
-    averaging_s: float = AVERAGING_S,
+    averaging_s: float = TEN_MINUTES_S,
     scan_share: float = 1.0,
     sweep: bool = True,
 ) -> TenMinute:
@@ -156,34 +161,130 @@ def predict_ten_minute(
     >>> mean.scans, round(float(mean.speed_std_mps), 2)
     (50.0, 0.14)
     """
-    period = _checked(Period(rays, wind, turbulence, averaging_s, scan_share, sweep))
-    turn = wind_frame(wind.from_deg)[:2, :2]
-    matrix, known = _fits(rays, gains, turn)
-    offset = np.asarray(mean_error_mps, dtype=float)
-    random, persistent = (_wind_covariance(matrix, value) for value in (random_m2s2, persistent_m2s2))
-    few, matrix = thinned(rays, matrix)
+    return predict_ten_minutes(
+        rays,
+        [wind],
+        turbulence,
+        gains=gains,
+        random_m2s2=[random_m2s2],
+        persistent_m2s2=persistent_m2s2,
+        mean_error_mps=[mean_error_mps],
+        reference=reference,
+        averaging_s=averaging_s,
+        scan_share=scan_share,
+        sweep=sweep,
+    )[0]
+
+
+def predict_ten_minutes(
+    rays: Rays,
+    winds: Sequence[WindState],
+    turbulence: Turbulence,
+    *,
+    gains: FloatArray | None = None,
+    random_m2s2: Sequence[ArrayLike] | None = None,
+    persistent_m2s2: ArrayLike = 0.0,
+    mean_error_mps: Sequence[ArrayLike] | None = None,
+    reference: Reference = "scalar",
+    averaging_s: float = TEN_MINUTES_S,
+    scan_share: float = 1.0,
+    sweep: bool = True,
+) -> list[TenMinute]:
+    """Predict `predict_ten_minute` for several states of the wind: those of one speed are worked out together.
+
+    Parameters
+    ----------
+    rays, turbulence, gains, persistent_m2s2, reference, averaging_s, scan_share, sweep
+        See `predict_ten_minute`.
+    winds
+        States.
+    random_m2s2, mean_error_mps
+        For each state what `predict_ten_minute` takes; none without.
+
+    Returns
+    -------
+    list of TenMinute
+        One for each state.
+    """
+    fits = ray_fit(rays).gain if gains is None else gains
+    random = [0.0] * len(winds) if random_m2s2 is None else random_m2s2
+    offset = [np.zeros(2)] * len(winds) if mean_error_mps is None else mean_error_mps
+    whole = Period(rays, winds, turbulence, averaging_s, scan_share, sweep)
+    out: dict[int, TenMinute] = {}
+    for group in _alike(winds, rays.count):
+        period = _checked(whole._replace(winds=[winds[index] for index in group]))
+        means = _means(
+            period,
+            fits,
+            [random[index] for index in group],
+            persistent_m2s2,
+            [offset[index] for index in group],
+            reference,
+        )
+        out.update(zip(group, means, strict=True))
+    return [out[index] for index in range(len(winds))]
+
+
+def _alike(winds: Sequence[WindState], rays: int) -> Iterator[list[int]]:
+    """Places of states with one speed, as many at once as memory allows."""
+    most = max(1, TOGETHER // min(rays, MOST_RAYS) ** 2)
+    speeds = np.array([wind.speed_mps for wind in winds])
+    for speed in dict.fromkeys(speeds.tolist()):
+        same = np.flatnonzero(speeds == speed).tolist()
+        yield from (same[start : start + most] for start in range(0, len(same), most))
+
+
+def _means(
+    period: Period,
+    gains: FloatArray,
+    random_m2s2: list[ArrayLike],
+    persistent_m2s2: ArrayLike,
+    mean_error_mps: list[ArrayLike],
+    reference: Reference,
+) -> list[TenMinute]:
+    """Means of all winds of a period."""
+    turns = np.stack([wind_frame(wind.from_deg)[:2, :2] for wind in period.winds])
+    shape = gains.shape[:-2]
+    matrix, known = _fits(gains.reshape(-1, *gains.shape[-2:]), turns)
+    offset = np.stack([np.broadcast_to(each, (*shape, 2)) for each in mean_error_mps]).reshape(
+        *known.shape, 2
+    )
+    errors = [_wind_covariance(part, each) for part, each in zip(matrix, random_m2s2, strict=True)]
+    persistent = _wind_covariance(matrix, persistent_m2s2)
+    few, matrix = thinned(period.rays, matrix)
     period = period._replace(rays=few)
-    lidar = scan_mean(period, matrix, np.array([wind.speed_mps, 0.0]) + offset @ turn.T, random, persistent)
+    vector = np.array([period.speed_mps, 0.0]) + np.einsum("wij,wsj->wsi", turns, offset)
+    lidar = scan_mean(period, matrix, vector, np.stack(errors), persistent)
     point = point_mean(period)
     cross, weight = scan_with_target(period, matrix)
     against = _against_cup if reference == "scalar" else _against_sonic
     mean, variance, covariance = against(period, lidar, point, cross, weight)
     lost = np.where(known, 0.0, np.nan)
-    vectors = _Vectors.of(lidar, point, np.einsum("pt,...ptij->...ij", weight, cross), turn, lost)
-    degrees = np.degrees(1.0) / wind.speed_mps if wind.speed_mps > 0 else np.nan
-    return TenMinute(
-        scans=scan_share * period.scans,
-        lidar_mean_mps=lidar.mean_mps + lost,
-        reference_mean_mps=np.broadcast_to(mean, known.shape),
-        lidar_variance_m2s2=lidar.variance_m2s2 + lost,
-        reference_variance_m2s2=np.broadcast_to(variance, known.shape),
-        covariance_m2s2=covariance + lost,
-        vector_covariance_m2s2=vectors.difference_m2s2,
-        mean_error_mps=np.broadcast_to(offset, (*known.shape, 2)),
-        reference_direction_std_deg=float(degrees * np.sqrt(point.vector_variance_m2s2[1])),
-        direction_covariance_deg2=degrees**2 * vectors.across_m2s2,
-        moments=wind_moments(wind.uv_mps, vectors.difference_m2s2, mean_error_mps=offset),
-    )
+    vectors = _Vectors.of(lidar, point, np.einsum("pt,...ptij->...ij", weight, cross), turns, lost)
+    degrees = np.degrees(1.0) / period.speed_mps if period.speed_mps > 0 else np.nan
+    truth = np.stack([wind.uv_mps for wind in period.winds])[:, None]
+    moments = wind_moments(truth, vectors.difference_m2s2, mean_error_mps=offset)
+
+    def of(index: int, values: FloatArray) -> FloatArray:
+        """One wind, with the axes of the gains."""
+        return values[index].reshape((*shape, *values.shape[2:]))
+
+    return [
+        TenMinute(
+            scans=period.scan_share * period.scans,
+            lidar_mean_mps=of(index, lidar.mean_mps + lost),
+            reference_mean_mps=np.broadcast_to(mean, shape),
+            lidar_variance_m2s2=of(index, lidar.variance_m2s2 + lost),
+            reference_variance_m2s2=np.broadcast_to(variance, shape),
+            covariance_m2s2=of(index, covariance + lost),
+            vector_covariance_m2s2=of(index, vectors.difference_m2s2),
+            mean_error_mps=of(index, offset),
+            reference_direction_std_deg=float(degrees * np.sqrt(point.vector_variance_m2s2[1])),
+            direction_covariance_deg2=of(index, degrees**2 * vectors.across_m2s2),
+            moments=WindMoments(*(of(index, values) for values in moments)),
+        )
+        for index in range(len(period.winds))
+    ]
 
 
 def subset_gains(rays: Rays, kept: list[slice]) -> FloatArray:
@@ -201,10 +302,10 @@ def subset_gains(rays: Rays, kept: list[slice]) -> FloatArray:
     array([[-1.   ,  1.414,  0.   ],
            [ 1.   ,  0.   ,  0.   ]])
     """
-    matrix = rows(rays.azimuth_deg, rays.elevation_deg)
+    matrix = ray_rows(rays)
     out = np.zeros((len(kept), 2, rays.count))
     for index, part in enumerate(kept):
-        out[index, :, part] = gain(matrix[part])
+        out[index, :, part] = gain(matrix[part])[:2]
     return out
 
 
@@ -216,11 +317,12 @@ class _Vectors(NamedTuple):
 
     @classmethod
     def of(
-        cls, lidar: ScanMean, point: PointMean, cross: FloatArray, turn: FloatArray, lost: FloatArray
+        cls, lidar: ScanMean, point: PointMean, cross: FloatArray, turns: FloatArray, lost: FloatArray
     ) -> "_Vectors":
         both = cross + np.swapaxes(cross, -1, -2)
         difference = lidar.vector_covariance_m2s2 - both + np.diag(point.vector_variance_m2s2)
-        return cls(turn.T @ difference @ turn + lost[..., None, None], cross[..., 1, 1] + lost)
+        turned = np.einsum("wki,wskl,wlj->wsij", turns, difference, turns)
+        return cls(turned + lost[..., None, None], cross[..., 1, 1] + lost)
 
 
 def _checked(period: Period) -> Period:
@@ -234,12 +336,11 @@ def _checked(period: Period) -> Period:
     return period
 
 
-def _fits(rays: Rays, gains: FloatArray | None, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fits (..., 1, 2, ray) to downwind and left, 0 where they are not known, and where they are."""
-    east_north = gain(rows(rays.azimuth_deg, rays.elevation_deg)) if gains is None else gains
-    matrix = (turn @ east_north)[..., None, :, :]
-    known = np.all(np.isfinite(matrix), axis=(-3, -2, -1))
-    return np.where(known[..., None, None, None], matrix, 0.0), known
+def _fits(gains: FloatArray, turns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fits (wind, size, 1, 2, ray) to downwind and left, 0 where they are not known, and where they are."""
+    known = np.all(np.isfinite(gains), axis=(-2, -1))
+    matrix = turns[:, None] @ np.where(known[:, None, None], gains, 0.0)
+    return matrix[:, :, None], np.broadcast_to(known, matrix.shape[:2])
 
 
 def _wind_covariance(matrix: FloatArray, ray_errors_m2s2: ArrayLike) -> FloatArray:
@@ -264,7 +365,7 @@ def _against_sonic(
     period: Period, lidar: ScanMean, point: PointMean, cross: FloatArray, weight: FloatArray
 ) -> Moments:
     """Mean and variance of the speed of the target's mean vector, and its covariance with the lidar."""
-    averaged = expand(np.array([period.wind.speed_mps, 0.0]), np.diag(point.vector_variance_m2s2))
+    averaged = expand(np.array([period.speed_mps, 0.0]), np.diag(point.vector_variance_m2s2))
     share = period.pass_share
     each = np.einsum("pt,...ptij->...pij", weight / np.where(share > 0, share, 1.0)[:, None], cross)
     values = speed_covariance(lidar.lidar, averaged, each)

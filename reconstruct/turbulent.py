@@ -14,8 +14,8 @@ from geometry.arrays import ArrayLike, FloatArray
 from reconstruct.covariance import lag_covariance, point_covariance
 from reconstruct.joint import expand
 from reconstruct.prediction import TEN_MINUTE_FIELDS, ScanPrediction, scan_prediction
+from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
-from reconstruct.retrieval import fit, gain, rows
 from reconstruct.spectra import Turbulence
 from reconstruct.ten_minute import Reference, TenMinute
 from reconstruct.thinning import thinned
@@ -62,7 +62,7 @@ def turbulence_covariance(
     array([[6.3, 0. ],
            [0. , 0.3]])
     """
-    matrix = gain(rows(rays.azimuth_deg, rays.elevation_deg)) if gains is None else gains
+    matrix = ray_fit(rays).gain if gains is None else gains
     rays, matrix = thinned(rays, matrix)
     within = np.mean(lag_covariance(rays, wind, turbulence, sweep=sweep)[:, 0], axis=0)
     return np.asarray(matrix @ within @ np.swapaxes(matrix, -1, -2))
@@ -119,7 +119,7 @@ def predict_turbulent(
     >>> round(still.speed_std_mps, 3), round(windy.speed_std_mps, 2)
     (0.019, 0.31)
     """
-    gains, condition = fit(rows(rays.azimuth_deg, rays.elevation_deg), weights)
+    gains, condition = ray_fit(rays, weights)
     lidars = wind_covariance_by_source(gains, rays, wind, sources) if sources is not None else {}
     clocks = _clocks(rays, sources)
     each = [turbulence_covariance(late, wind, turbulence, gains=gains, sweep=sweep) for late in clocks]

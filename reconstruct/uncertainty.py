@@ -154,7 +154,7 @@ def ray_covariance(rays: Rays, wind: WindState, sources: ErrorSources | Sequence
     """Covariance (ray, ray) of the errors of the radial speeds [m²/s²]: Σ over sources of ρ s sᵀ + (1 - ρ)
     diag(s²).
 
-    JCGM 100:2008, equation 16; rays of different lidars are independent. The matrix grows with the square of
+    The u(x_i, x_j) of JCGM 100:2008, equation 13; rays of different lidars are independent. The matrix grows with the square of
     the number of rays: to propagate alone, `wind_covariance_by_source` needs none.
 
     Examples
@@ -181,7 +181,7 @@ def ray_covariance(rays: Rays, wind: WindState, sources: ErrorSources | Sequence
 def wind_covariance_by_source(
     gain: FloatArray, rays: Rays, wind: WindState, sources: ErrorSources | Sequence[ErrorSources]
 ) -> dict[str, FloatArray]:
-    """Covariance (2, 2) of the retrieved (u, v) from each source [m²/s²]: P = G C Gᵀ.
+    """Covariance (2, 2) of the retrieved (u, v) from each source [m²/s²]: P = G C Gᵀ (JCGM 102:2011, 6.2.1.3).
 
     Parameters
     ----------

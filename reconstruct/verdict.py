@@ -34,8 +34,6 @@ class Simulation:
     reference_mps: FloatArray  # (realisation, sample, 2) u, v at the target
     block: IntArray  # (realisation,) realisations of one block share a field
     condition: float
-    subgrid_share: float = 0.0  # variance of the wind that was added as independent noise
-    box_share: float = 1.0  # resolved variance of the boxes before its repair
 
     @property
     def lost_scans(self) -> int:
@@ -257,7 +255,7 @@ def _jackknife(statistic: Callable[[_Periods], float], whole: _Periods, without:
     """Value of a statistic, and its standard error from leaving out one block at a time.
 
     SE² = (B - 1)/B sum (T_b - mean T)² over B blocks (Efron and Stein 1981, Ann. Statist. 9, 586-596,
-    doi:10.1214/aos/1176345462).
+    doi:10.1214/aos/1176345462, eq. 1.4 and 1.5).
     """
     if len(without) < 2:
         return Estimate(statistic(whole), float("nan"))

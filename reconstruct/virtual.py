@@ -12,21 +12,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.error_draws import Draws, draw_pointing, draw_speed_errors
 from reconstruct.field import Field, synthesise
-from reconstruct.flight import Sampling, radial_speed_mps, reach_m, reference_mps, subgrid_root, to_wind_frame
-from reconstruct.monte_carlo import scans_in, spread_shifts_m
+from reconstruct.flight import Sampling, WaveSight, radial_speed_mps, reach_m, to_wind_frame
+from reconstruct.monte_carlo import REFERENCE_INTERVAL_S, Air, reference_uv_mps, scans_in, spread_shifts_m
+from reconstruct.periods import TEN_MINUTES_S
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.uncertainty import ErrorSources
-from reconstruct.wind import WindState, uv_mps
+from reconstruct.wind import WindState
 
 PERIODS_PER_FIELD = 4  # share a field, at heights of it that have little in common
-REFERENCE_INTERVAL_S = 1.0
-FAN_KNOTS = 7  # rays of a fan that the small eddies are worked out for: every 10° of 60°
-FAN_ELEVATION_DEG = 3.0  # a fan is about level
 _CORRELATED = (
     ("radial_speed_mps", "radial_speed_correlation"),
     ("azimuth_deg", "azimuth_correlation"),
@@ -66,7 +64,7 @@ class Flown:
 class VirtualSettings(NamedTuple):
     """How a campaign is flown."""
 
-    averaging_s: float = 600.0
+    averaging_s: float = TEN_MINUTES_S
     sampling: Sampling = Sampling()
     spacing_m: float | None = None  # of the field's cells
     periods_per_field: int = PERIODS_PER_FIELD
@@ -130,8 +128,7 @@ def fly(
 
     Notes
     -----
-    Eddies smaller than the field's cells are added as noise that is independent between scans and the
-    reference. The reference's samples are one second apart.
+    All scans and the reference meet the same eddies of every size. The reference's samples are one second apart.
     """
     if not scans:
         raise InputError("there is no scan to fly: a virtual campaign needs at least one that has a target")
@@ -147,12 +144,15 @@ def fly(
         field = _field(scans, together, turbulence, settings, rng)
         shifts = np.zeros((len(together), 3)) if field is None else spread_shifts_m(field, len(together), rng)
         for step, (state, shift) in enumerate(zip(together, shifts, strict=True)):
-            air = _Air(field, turbulence, shift)
+            passing = None
+            if field is not None and turbulence is not None:
+                air = Air(field, turbulence.std_mps(state.speed_mps))
+                passing = _Passing(air, shift, field.waves.amplitudes(rng))
             seen = [
-                _radial_speeds(scan, errors, state, air, settings, rng)
+                _radial_speeds(scan, errors, state, passing, settings, rng)
                 for scan, errors in zip(scans, lasting, strict=True)
             ]
-            yield Flown(start + step, state, seen, _reference(state, air, settings.averaging_s, rng), number)
+            yield Flown(start + step, state, seen, _reference(state, passing, settings.averaging_s), number)
 
 
 class _Lasting(NamedTuple):
@@ -163,12 +163,12 @@ class _Lasting(NamedTuple):
     factor: FloatArray  # (1, ray)
 
 
-class _Air(NamedTuple):
-    """The air of one period."""
+class _Passing(NamedTuple):
+    """The air of one period: a field from some place of its box on."""
 
-    field: Field | None
-    turbulence: Turbulence | None
+    air: Air
     shift_m: FloatArray  # (3,)
+    amplitudes: FloatArray  # of the field's waves
 
 
 def _lasting(scan: VirtualScan, seed: int) -> _Lasting:
@@ -201,7 +201,7 @@ def _radial_speeds(
     scan: VirtualScan,
     lasting: _Lasting,
     state: WindState,
-    air: _Air,
+    passing: _Passing | None,
     settings: VirtualSettings,
     rng: np.random.Generator,
 ) -> FloatArray:
@@ -211,64 +211,29 @@ def _radial_speeds(
     _, sources = split_sources(scan.sources)
     fresh = draw_pointing(sources, rays, shape, rng).realisation(0)
     errors = Draws(*(now + always for now, always in zip(fresh, lasting.draws, strict=True)))
-    std = 0.0 if air.turbulence is None else air.turbulence.std_mps(state.speed_mps)
-    clean = radial_speed_mps(
-        rays,
-        wind,
-        errors,
-        scans=shape[1],
-        sampling=settings.sampling,
-        field=air.field,
-        std_mps=std,
-        shift_m=air.shift_m + to_wind_frame(scan.offset_m, state.from_deg),
-    )
-    if air.field is not None and air.turbulence is not None:
-        small = subgrid_std(rays, wind, air.turbulence, air.field.cut_per_m)
-        clean += std * small * rng.standard_normal(clean.shape)
+    offset_m = to_wind_frame(scan.offset_m, state.from_deg)
+    if passing is None:
+        clean = radial_speed_mps(rays, wind, errors, scans=shape[1], sampling=settings.sampling)
+    else:
+        air = passing.air
+        clean = radial_speed_mps(
+            rays,
+            wind,
+            errors,
+            scans=shape[1],
+            sampling=settings.sampling,
+            field=air.field,
+            std_mps=air.std_mps,
+            shift_m=passing.shift_m + offset_m,
+        )
+        sight = WaveSight.of(rays, wind, air.field.waves, errors, offset_m=offset_m)
+        clean += air.std_mps * sight.radial_speed(passing.amplitudes, shape[1])
     noise, _ = draw_speed_errors(sources, rays, shape, rng)
     return np.asarray(clean * lasting.factor + lasting.speed_mps + noise[0])
 
 
-def subgrid_std(rays: Rays, wind: WindState, turbulence: Turbulence, cut_per_m: float) -> FloatArray:
-    """(ray,) standard deviation of what eddies beyond a wavenumber add to the rays of one lidar.
-
-    For a longitudinal variance of 1. Along a fan it changes slowly: some rays are worked out
-    (`flight.subgrid_root`) and the others lie between them.
-    """
-    if rays.count <= FAN_KNOTS or np.ptp(rays.elevation_deg) > FAN_ELEVATION_DEG:
-        root = subgrid_root(rays, wind, turbulence, cut_per_m)
-        return np.asarray(np.sqrt(np.sum(np.square(root), axis=1)))
-    knots = np.unique(np.linspace(0, rays.count - 1, FAN_KNOTS).round().astype(np.intp))
-    some = subgrid_root(rays_at(rays, knots), wind, turbulence, cut_per_m)
-    variance = np.interp(np.arange(rays.count), knots, np.sum(np.square(some), axis=1))
-    return np.asarray(np.sqrt(variance))
-
-
-def rays_at(rays: Rays, index: IntArray) -> Rays:
-    """Some rays of a scan, with its timing."""
-    per_ray = (
-        "azimuth_deg",
-        "elevation_deg",
-        "range_m",
-        "head_m",
-        "lidar",
-        "time_s",
-        "duration_s",
-        "swept_azimuth_deg",
-    )
-    return replace(rays, **{name: getattr(rays, name)[index] for name in per_ray})
-
-
-def _reference(state: WindState, air: _Air, averaging_s: float, rng: np.random.Generator) -> FloatArray:
+def _reference(state: WindState, passing: _Passing | None, averaging_s: float) -> FloatArray:
     """(sample, 2) eastward and northward wind that a point instrument at the reference meets [m/s]."""
-    times = np.arange(0.5 * REFERENCE_INTERVAL_S, averaging_s, REFERENCE_INTERVAL_S)
-    if air.field is None or air.turbulence is None:
-        return np.tile(state.uv_mps, (len(times), 1))
-    std = air.turbulence.std_mps(state.speed_mps)
-    met = reference_mps(state, times, field=air.field, std_mps=std, shift_m=air.shift_m)
-    met = met + std * rng.multivariate_normal(
-        np.zeros(3), air.field.subgrid, size=len(times), method="cholesky"
-    )
-    downwind = np.stack(uv_mps(1.0, state.from_deg))
-    left = np.array([-downwind[1], downwind[0]])
-    return np.asarray(met[:, :1] * downwind + met[:, 1:2] * left)
+    if passing is None:
+        return np.tile(state.uv_mps, (int(averaging_s / REFERENCE_INTERVAL_S), 1))
+    return reference_uv_mps(state, passing.air, passing.shift_m, passing.amplitudes, averaging_s)

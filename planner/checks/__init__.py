@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from planner.checks import beams, crossing, instrument, map_frame, obstruction, timing, wakes
+from planner.checks import beams, crossing, instrument, joint_fit, map_frame, obstruction, timing, wakes
 from planner.finding import Finding, by_severity
 from planner.plan import Plan
 
@@ -10,6 +10,7 @@ CHECKS: tuple[Callable[[Plan], Iterator[Finding]], ...] = (
     map_frame.find,
     beams.find,
     crossing.find,
+    joint_fit.find,
     obstruction.find,
     wakes.find,
     timing.find,

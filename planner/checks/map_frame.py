@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from planner.crs_area import is_transverse_mercator
 from planner.finding import Finding
+from planner.ground import ground_under_m
 from planner.plan import Plan
 
 # A UTM zone is 3° to each side; beyond it scale and convergence grow fast.
@@ -21,7 +22,6 @@ def find(plan: Plan) -> Iterator[Finding]:
     yield from _same_place(plan)
     yield from _below_ground(plan)
     yield from _heads(plan)
-    yield from _terrain(plan)
 
 
 def _area(plan: Plan) -> Iterator[Finding]:
@@ -75,9 +75,10 @@ def _below_ground(plan: Plan) -> Iterator[Finding]:
     """Targets against the ground."""
     for target in plan.site.targets:
         above_m = plan.places.height_above_ground_m(target.name)
+        ground_m = plan.site.target_position_m(target)[2] - above_m
         if above_m <= 0.0:
             text = (
-                f"the target is {abs(above_m):.1f} m below the ground at {plan.site.ground_m:g} m: check its "
+                f"the target is {abs(above_m):.1f} m below the ground at {ground_m:g} m: check its "
                 "height, ground_height_m and height_datum"
             )
             yield Finding("error", "target-height", target.name, above_m, "m", 0.0, text)
@@ -86,22 +87,12 @@ def _below_ground(plan: Plan) -> Iterator[Finding]:
 def _heads(plan: Plan) -> Iterator[Finding]:
     """Heads of the lidars against the ground."""
     for lidar in plan.site.lidars:
-        above_m = lidar.position[2] - plan.site.ground_m
+        ground_m = float(ground_under_m(plan.site, lidar.position))
+        above_m = lidar.position[2] - ground_m
         if above_m < -HEAD_BELOW_GROUND_M:
             text = (
-                f"the head is {abs(above_m):.1f} m below the ground at {plan.site.ground_m:g} m, more than the "
+                f"the head is {abs(above_m):.1f} m below the ground at {ground_m:g} m, more than the "
                 f"{HEAD_BELOW_GROUND_M:g} m that uneven ground explains: check its height, ground_height_m and "
                 "height_datum"
             )
             yield Finding("warning", "head-height", lidar.name, above_m, "m", -HEAD_BELOW_GROUND_M, text)
-
-
-def _terrain(plan: Plan) -> Iterator[Finding]:
-    """A terrain is for placing; everything else takes one level."""
-    terrain = plan.site.terrain
-    if terrain is not None:
-        text = (
-            "heights of the terrain are used by `lidarplan place`; everywhere else the ground is level at "
-            f"{plan.site.ground_m:g} m, that of what stands lowest: look for hills in the beams on a map"
-        )
-        yield Finding("info", "terrain-partial", terrain.file.name, plan.site.ground_m, "m", None, text)

@@ -7,6 +7,7 @@ import numpy as np
 from geometry.arrays import BoolArray
 from planner.finding import Finding, Severity
 from planner.obstruction import Obstruction
+from planner.over_terrain import OverTerrain
 from planner.plan import Plan
 
 
@@ -14,6 +15,9 @@ def find(plan: Plan) -> Iterator[Finding]:
     """Findings about rays lost to rotors, towers, masts and obstacles, and about near misses."""
     for met in plan.obstructions:
         yield _lost(plan, met) if met.lost_rays else _near(met)
+    for sight in plan.over_terrain:
+        if sight.not_known.any():
+            yield _unknown(sight)
 
 
 def _lost(plan: Plan, met: Obstruction) -> Finding:
@@ -40,6 +44,17 @@ def _near(met: Obstruction) -> Finding:
         "of it before trusting the gate"
     )
     return Finding("info", "beam-near", met.scan, met.clearance_m, "m", met.margin_m, text)
+
+
+def _unknown(sight: OverTerrain) -> Finding:
+    """Rays that leave the height raster: nothing is known of the ground under them, so they are not clear."""
+    count, rays = int(sight.not_known.sum()), len(sight.not_known)
+    which = "the beam leaves" if rays == 1 else f"{count} of {rays} rays leave{'s' if count == 1 else ''}"
+    text = (
+        f"{which} the height raster, or cross{'es' if count == 1 else ''} a hole of it, on the way to the gate: whether the "
+        "ground is in the way there is not known; give a raster that holds lidars and gates"
+    )
+    return Finding("warning", "terrain-unknown", sight.scan, count, "rays", 0.0, text)
 
 
 def _named(met: Obstruction) -> str:

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from planner.finding import Finding, Severity
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
+from reconstruct.periods import TEN_MINUTES_S
 
-TEN_MINUTES_S = 600.0
 # Scans in ten minutes.
 FEWEST_SCANS = 12
 # Declared against computed; periods are written down to a tenth of a second.

@@ -8,7 +8,8 @@ from planner.exclusion import Exclusion, Near
 from planner.finding import Finding, Severity
 from planner.plan import Plan
 
-# IEC 61400-12-1:2017: nearer, a rotor's own blockage changes the wind in front of it.
+# IEC 61400-12-1 has the mast of a power curve 2 to 4 rotor diameters from its turbine, usually 2.5: nearer, the rotor's own
+# blockage changes the wind in front of it.
 INDUCTION_DIAMETERS = 2.5
 # Nothing is left where no more than a thousandth of the wanted wind is.
 LOST_SHARE_ERROR = 0.999

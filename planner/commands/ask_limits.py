@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from planner.campaign import Campaign, Filters, RayInput
     from planner.files.yaml_campaign import Loaded
     from planner.plan import Plan
+    from planner.scan_jobs import ScanJob
     from reconstruct.scan_grid import ScanGrid
 
 YES = ("y", "yes")
@@ -40,7 +41,8 @@ def _approved(item: "RayInput", campaign: "Campaign", plan: "Plan") -> "Filters"
     from planner.analysis_files import told
     from planner.scan_retrieval import filter_rays
 
-    grid, rays = _first_rays(item, campaign, plan)
+    job = _first_job(item, campaign, plan)
+    grid, rays = _first_rays(item, job, campaign, plan)
     folder, name = campaign.output, item.scan
     say(f"{name}: {rays} rays, unfiltered: {_drawn(folder, name, 'unfiltered', grid, None)}")
     while True:
@@ -57,26 +59,28 @@ def _approved(item: "RayInput", campaign: "Campaign", plan: "Plan") -> "Filters"
             return filters
 
 
-def _first_rays(item: "RayInput", campaign: "Campaign", plan: "Plan") -> "tuple[ScanGrid, int]":
-    """Scans of the first part of an input."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from geometry.errors import InputError
-    from planner.ray_files import at_gate, parts_of
-    from planner.scan_retrieval import job_of
-    from reconstruct.scan_grid import scan_grid
+def _first_job(item: "RayInput", campaign: "Campaign", plan: "Plan") -> "ScanJob":
+    """The scan's, or that of its first point or gate: limits are one for all."""
+    from planner.scan_jobs import jobs_of
 
     layout = plan.layout[item.scan]
-    part = next(parts_of(item, layout, plan.places, rays=campaign.chunk_rays), None)
+    return jobs_of(layout, plan.places, item, sizes_deg=campaign.sizes_deg, columns=campaign.columns)[0]
+
+
+def _first_rays(
+    item: "RayInput", job: "ScanJob", campaign: "Campaign", plan: "Plan"
+) -> "tuple[ScanGrid, int]":
+    """Scans of the first part of an input; of a slice or raster at the gate in the middle."""
+    from geometry.errors import InputError
+    from planner.ray_files import at_gate, parts_of
+    from planner.scan_jobs import gridded
+
+    part = next(parts_of(item, job.layout, plan.places, job.range_m, rays=campaign.chunk_rays), None)
     if part is None:
         raise InputError(f"scan '{item.scan}' has no rays to choose limits from")
-    records = at_gate(part.load(), item, layout, plan.places)
-    job = job_of(layout, plan.places, campaign.sizes_deg)
-    if layout.scan.count == 1:
-        records = replace(records, sweep_id=np.arange(records.rays))
-    return scan_grid(records, job.planned_azimuth_deg, step_deg=job.step_deg).grid, records.rays
+    records = at_gate(part.load(), item, job.layout, plan.places, job.range_m)
+    middle = records.gates // 2
+    return gridded(records.at_gates(slice(middle, middle + 1)), job).grid, records.rays
 
 
 def _drawn(folder: Path, scan: str, what: str, grid: "ScanGrid", after: object) -> Path:

@@ -1,84 +1,82 @@
-"""`lidarplan cnr-map plan SITE` and `fit MAP...`: scan hard targets, and learn from them how the head stands."""
+"""`lidarplan cnr-map plan SITE`, `simulate`, `fit` and `level`: scan hard targets, and learn how the head stands."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.commands.cnr_options import (
+    AccumulationOption,
+    BeamOption,
+    FftOption,
+    HeadingOption,
+    LidarOption,
+    OrderOption,
+    PulseOption,
+    TargetsOption,
+    number,
+)
 from planner.commands.options import JsonOption, QuietOption, SiteArgument, remark, say, say_json
 
 if TYPE_CHECKING:
-    from planner.cnr_fit import HeadFit
     from planner.cnr_map import MapPlan
-    from reconstruct.mounting_fit import Angle
+    from planner.cnr_simulate import Rehearsal
     from reconstruct.target_choice import Choice
 
-LidarOption = Annotated[str, typer.Option("--lidar", metavar="L", help="Name of the lidar.")]
-TargetOption = Annotated[
-    str | None,
-    typer.Option("--target", metavar="T", help="Hard target, mast or turbine. [default: the best three]"),
+RaysOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for a table of the rays of each map, in head angles."),
 ]
-OrderOption = Annotated[str, typer.Option("--order", metavar="rows|columns", help="PPI rows or RHI columns.")]
-AccumulationOption = Annotated[
-    float | None, typer.Option("--accumulation", metavar="S", help="Of one ray [s]. [default: the least]")
+MapsOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder for the maps, one CSV a target, and truth.json.")
 ]
-HeadingOption = Annotated[
-    float | None,
-    typer.Option("--heading-std", metavar="DEG", help="How well the heading is known; 180 for not at all."),
-]
-BeamOption = Annotated[
-    float, typer.Option("--beam", metavar="M", help="Diameter of the beam at the target [m].")
-]
-PulseOption = Annotated[float | None, typer.Option("--pulse-ns", help="Pulse of the maps [ns].")]
-FftOption = Annotated[
-    int | None, typer.Option("--fft-points", min=1, help="Samples of one gate of the maps.")
-]
-MapsArgument = Annotated[
-    list[str],
-    typer.Argument(metavar="MAP...", help="Measured maps, FILE or TARGET=FILE, in the order of time."),
-]
-SiteOption = Annotated[str, typer.Option("--site", metavar="SITE", help="Site file.")]
-SolveOption = Annotated[
+PlantOption = Annotated[
     str | None,
     typer.Option(
-        "--solve", metavar="NAME,...", help="Angles to solve for. [default: both offsets, pitch, roll]"
+        "--plant",
+        metavar="NAME=VALUE,...",
+        help="How the head stands, less what the site file says, such as azimuth_offset_deg=0.05,pitch_deg=0.03; "
+        "the rest as it says. [default: drawn from the lidar's uncertainty]",
     ),
 ]
-WriteOption = Annotated[bool, typer.Option("--write", help="Put the offsets into the site file.")]
-FiguresOption = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for a figure of each map.")
-]
+SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Of noise and of the survey's errors.")]
 
 
 def register(app: typer.Typer) -> None:
-    """Add the group of two commands to the application."""
+    """Add the group of commands to the application."""
+    from planner.commands.cnr_map_fit import fit, level
+
     group = typer.Typer(
         name="cnr-map",
-        help="CNR maps of hard targets: plan them, and fit offsets to them.",
+        help="CNR maps of hard targets: plan them, rehearse them, and fit offsets to them.",
         no_args_is_help=True,
     )
     group.command("plan")(plan)
+    group.command("simulate")(simulate)
     group.command("fit")(fit)
+    group.command("level")(level)
     app.add_typer(group)
 
 
 def plan(
     site: SiteArgument,
     lidar: LidarOption,
-    target: TargetOption = None,
+    target: TargetsOption = None,
     order: OrderOption = "rows",
     accumulation: AccumulationOption = None,
     heading_std: HeadingOption = None,
     beam: BeamOption = 0.1,
     pulse_ns: PulseOption = None,
     fft_points: FftOption = None,
+    out: RaysOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Search window, steps, gates and time of a map; and which targets fix the head best."""
     from typing import get_args
 
-    from planner.cnr_map import Order, choose_targets, plan_map
+    from planner.cnr_map import choose_targets, plan_map
+    from planner.cnr_window import Order
     from planner.commands.choices import chosen, within
     from planner.commands.load import load_plan
 
@@ -88,7 +86,7 @@ def plan(
     within("--pulse-ns", pulse_ns, 0.0, open_below=True)
     places = load_plan(site).exact_places
     choice = choose_targets(places, lidar)
-    names = [target] if target is not None else list(choice.names) if choice else []
+    names = target or (list(choice.names) if choice else [])
     lines = chosen("--order", order, get_args(Order))
     plans = [
         plan_map(
@@ -104,87 +102,144 @@ def plan(
         )
         for name in names
     ]
+    if out is not None:
+        _write_rays(plans, out)
     if json:
         say_json({"maps": [_map_document(item) for item in plans], "best_targets": _choice_document(choice)})
         return
     _print_plans(plans)
     _print_choice(choice)
     remark(
-        "Head angles; the window is three standard deviations of position, levelling, heading and target to each side.",
+        "Head angles; the window is three standard deviations of position, levelling, heading and target to each side. "
+        "Rows and columns are staggered by parts of a step: --out DIR writes every ray.",
         quiet=quiet,
     )
 
 
-def fit(
-    maps: MapsArgument,
-    site: SiteOption,
+def simulate(
+    site: SiteArgument,
     lidar: LidarOption,
-    solve: SolveOption = None,
-    write: WriteOption = False,
-    out: FiguresOption = None,
+    out: MapsOption,
+    target: TargetsOption = None,
+    plant: PlantOption = None,
+    seed: SeedOption = 0,
     beam: BeamOption = 0.1,
     pulse_ns: PulseOption = None,
     fft_points: FftOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Targets in measured maps, and heading, pitch, roll and offsets of the head from them."""
+    """Rehearse the test: the planned maps as a head gives them that stands as is planted, for `fit` to find out."""
+    from numpy.random import default_rng
+
     from geometry.errors import InputError
-    from planner.cnr_fit import fit_head, read_maps, site_keys
-    from planner.cnr_map import map_probe
+    from planner.cnr_map import choose_targets
+    from planner.cnr_simulate import rehearse
     from planner.commands.choices import within
     from planner.commands.load import load_plan
-    from planner.files.yaml_edit import write_lidar
+    from planner.output import require_folder
 
-    if write and site == "-":
-        raise InputError("--write needs a site file to write to, not standard input")
     within("--beam", beam, 0.0, open_below=True)
     within("--pulse-ns", pulse_ns, 0.0, open_below=True)
+    require_folder(out)
     places = load_plan(site).exact_places
-    probe = map_probe(places.site.lidar(lidar), pulse_ns, fft_points)
-    result = fit_head(places, lidar, read_maps(maps), probe=probe, solve=_angles(solve), beam_width_m=beam)
-    if out is not None:
-        _draw(result, out, probe.length_m)
-    if write:
-        write_lidar(Path(site), lidar, site_keys(result))
+    choice = None if target else choose_targets(places, lidar)
+    names = target or (list(choice.names) if choice else [])
+    if not names:
+        raise InputError(
+            f"no hard target, mast or turbine is in sight of {lidar} and in reach: there is nothing to map"
+        )
+    done = rehearse(
+        places,
+        lidar,
+        names,
+        rng=default_rng(seed),
+        planted=None if plant is None else _planted(plant),
+        pulse_ns=pulse_ns,
+        fft_points=fft_points,
+        beam_width_m=beam,
+    )
+    document = _write_maps(done, out, seed)
     if json:
-        say_json(_fit_document(result, written=write))
+        say_json(document)
         return
-    _print_fit(result)
-    if write:
-        remark(f"{site} has the new offsets; `lidarplan point` uses them.", quiet=quiet)
+    for file in document["maps"].values():
+        say(str(out / file))
+    text = ", ".join(f"{name} {value:+.4f}" for name, value in done.planted.items() if value)
+    say(f"Planted, beyond what the site file says: {text or 'nothing'}.")
+    files = " ".join(f"'{out / file}'" for file in document["maps"].values())
+    remark(f"Next: lidarplan cnr-map fit {files} --site {site} --lidar {lidar}", quiet=quiet)
 
 
-def _angles(text: str | None) -> "tuple[Angle, ...]":
-    from typing import get_args
+def _planted(text: str) -> dict[str, float]:
+    """NAME=VALUE,... as numbers."""
+    from geometry.errors import InputError
+    from planner.cnr_simulate import PLANTABLE
+    from planner.commands.choices import chosen, within
 
-    from planner.commands.choices import chosen
-    from reconstruct.mounting_fit import ANGLES, Angle
+    planted: dict[str, float] = {}
+    for part in text.split(","):
+        name, _, value = (piece.strip() for piece in part.partition("="))
+        chosen("--plant", name, PLANTABLE)
+        try:
+            planted[name] = float(value)
+        except ValueError:
+            raise InputError(f"--plant {part.strip()} came; allowed: {name}=NUMBER") from None
+        within(f"--plant {name}", planted[name], -180.0, 180.0)
+    return planted
 
-    allowed: tuple[Angle, ...] = get_args(Angle)
-    if text is None:
-        return ANGLES
-    return tuple(chosen("--solve", part.strip(), allowed) for part in text.split(","))
+
+def _write_maps(done: "Rehearsal", out: Path, seed: int) -> dict[str, Any]:
+    """The maps as tables of rays, and what was planted; the document of both."""
+    from dataclasses import asdict
+    from json import dumps
+
+    from planner.cnr_simulate import map_records
+    from planner.handover.names import file_stems
+    from planner.output import output_folder
+    from reconstruct.record_tables import to_wide
+
+    stems = file_stems(name for name, _ in done.maps)
+    document = {
+        "lidar": done.lidar.name,
+        "seed": seed,
+        "planted": done.planted,
+        "mounting": asdict(done.mounting),
+        "head_off_m": done.head_off_m.tolist(),
+        "maps": {name: f"{stems[name]}.csv" for name, _ in done.maps},
+    }
+    with output_folder(out) as folder:
+        for plan, (name, cnr_map) in zip(done.plans, done.maps, strict=True):
+            to_wide(map_records(cnr_map, plan)).to_csv(
+                folder / f"{stems[name]}.csv", index=False, float_format="%.9g"
+            )
+        (folder / "truth.json").write_text(
+            dumps(document, ensure_ascii=False, indent=1) + "\n", encoding="utf-8"
+        )
+    return document
 
 
-def _draw(result: "HeadFit", out: Path, probe_m: float) -> None:
-    from planner.figures.cnr_map import cnr_map_figure
+def _write_rays(plans: "list[MapPlan]", out: Path) -> None:
+    """A table of each map's rays in the order of measurement."""
+    from planner.handover.names import file_stems
     from planner.output import output_folder
 
+    stems = file_stems(item.target.name for item in plans)
     with output_folder(out) as folder:
-        for number, item in enumerate(result.maps, start=1):
-            (folder / f"cnr-map-{number}.png").write_bytes(cnr_map_figure(item, probe_m))
-
-
-def _number(value: float) -> float | None:
-    """JSON has no NaN: what is unknown is null."""
-    from math import isfinite
-
-    return float(value) if isfinite(value) else None
+        for item in plans:
+            lines = ["map,ray,azimuth_head_deg,elevation_head_deg,accumulation_s"]
+            for window in item.windows:
+                lines += [
+                    f"{window.stage},{ray},{azimuth % 360.0:.4f},{elevation:.4f},{window.accumulation_s:g}"
+                    for ray, (azimuth, elevation) in enumerate(zip(*window.rays, strict=True))
+                ]
+            (folder / f"{stems[item.target.name]}_rays.csv").write_text(
+                "\n".join(lines) + "\n", encoding="utf-8"
+            )
 
 
 def _map_document(item: "MapPlan") -> dict[str, Any]:
-    from planner.cnr_map import window_record
+    from planner.cnr_window import window_record
 
     seen = item.expected
     return {
@@ -211,6 +266,13 @@ def _map_document(item: "MapPlan") -> dict[str, Any]:
             for other, in_gates in item.others
         ],
         "hidden_by": list(item.hidden_by),
+        "ground": None
+        if item.ground is None
+        else {
+            "share": item.ground.share,
+            "up_to_head_elevation_deg": number(item.ground.up_to_deg),
+            "unknown": item.ground.unknown,
+        },
         "notes": list(item.notes),
     }
 
@@ -218,12 +280,12 @@ def _map_document(item: "MapPlan") -> dict[str, Any]:
 def _choice_document(choice: "Choice | None") -> dict[str, Any] | None:
     if choice is None:
         return None
-    stds = {name: _number(std) for name, std in zip(choice.solved, choice.std_deg, strict=True)}
+    stds = {name: number(std) for name, std in zip(choice.solved, choice.std_deg, strict=True)}
     return {"targets": list(choice.names), "std_deg": stds, "undetermined": list(choice.undetermined)}
 
 
 def _print_plans(plans: "list[MapPlan]") -> None:
-    from planner.cnr_map import window_record
+    from planner.cnr_window import window_record
     from planner.commands.table import print_table
 
     rows = []
@@ -261,10 +323,26 @@ def _print_plans(plans: "list[MapPlan]") -> None:
             say(
                 f"{item.target.name}: {other.part} of {other.name} is in the window at {other.range_m:.0f} m, {where}."
             )
+        if item.ground is not None:
+            say(f"{item.target.name}: {_ground_words(item)}.")
         if item.hidden_by:
             say(f"{item.target.name}: {', '.join(item.hidden_by)} may stand before it.")
         for note in item.notes:
             say(f"{item.target.name}: {note}.")
+
+
+def _ground_words(item: "MapPlan") -> str:
+    ground = item.ground
+    if ground is None:
+        return ""
+    outside = "part of the window lies outside the height raster: what is there is not known"
+    if not ground.share:
+        return outside
+    met = (
+        f"{100 * ground.share:.0f} % of the rays, up to {ground.up_to_deg:.3f}° head elevation, meet the ground before "
+        "the end of the gates"
+    )
+    return f"{met}; {outside}" if ground.unknown else met
 
 
 def _print_choice(choice: "Choice | None") -> None:
@@ -275,97 +353,3 @@ def _print_choice(choice: "Choice | None") -> None:
     say(f"Best targets: {', '.join(choice.names)}; they would give {stds}.")
     if choice.undetermined:
         say(f"Warning: they leave {', '.join(choice.undetermined)} undetermined.")
-
-
-def _fit_document(result: "HeadFit", *, written: bool) -> dict[str, Any]:
-    from planner.cnr_fit import site_keys
-
-    fitted = result.fit
-    return {
-        "lidar": result.lidar.name,
-        "angles": [
-            {
-                "name": angle,
-                "before_deg": getattr(result.before, angle),
-                "value_deg": getattr(fitted.mounting, angle),
-                "std_deg": fitted.std_deg(angle),
-                "significant": fitted.is_significant(angle, getattr(result.before, angle)),
-            }
-            for angle in fitted.solved
-        ],
-        "covariance_deg2": fitted.covariance_deg2.tolist(),
-        "range_offset_m": fitted.mounting.range_offset_m,
-        "range_offset_std_m": _number(fitted.range_std_m),
-        "chi_square": fitted.chi_square,
-        "freedom": fitted.freedom,
-        "targets": [
-            {
-                "name": item.name,
-                "azimuth_head_deg": item.found.azimuth_deg,
-                "elevation_head_deg": item.found.elevation_deg,
-                "range_head_m": item.found.range_m,
-                "azimuth_std_deg": _number(item.found.azimuth_std_deg),
-                "elevation_std_deg": _number(item.found.elevation_std_deg),
-                "range_std_m": _number(item.found.range_std_m),
-                "azimuth_residual_deg": _number(left.azimuth_deg),
-                "elevation_residual_deg": _number(left.elevation_deg),
-                "range_residual_m": _number(left.range_m),
-                "outlier": left.outlier,
-            }
-            for item, left in zip(result.maps, fitted.residuals, strict=True)
-        ],
-        "drift": [
-            {
-                key: _number(value) if isinstance(value, float) else value
-                for key, value in drift._asdict().items()
-            }
-            for drift in result.drifts
-        ],
-        "site_keys": site_keys(result),
-        "written": written,
-    }
-
-
-def _print_fit(result: "HeadFit") -> None:
-    from planner.commands.table import print_table
-
-    fitted = result.fit
-    rows = [
-        (
-            angle.removesuffix("_deg").replace("_", " ") + " °",
-            f"{getattr(result.before, angle):.4f}",
-            f"{getattr(fitted.mounting, angle):.4f}",
-            f"{fitted.std_deg(angle):.4f}",
-            "yes" if fitted.is_significant(angle, getattr(result.before, angle)) else "no",
-        )
-        for angle in fitted.solved
-    ]
-    offset = fitted.mounting.range_offset_m
-    rows.append(
-        (
-            "range offset m",
-            f"{result.before.range_offset_m:.2f}",
-            f"{offset:.2f}",
-            f"{fitted.range_std_m:.2f}",
-            "–",
-        )
-    )
-    print_table(f"{result.lidar.name}", ("", "before", "found", "std", "change significant"), rows)
-    left = [
-        (
-            item.name,
-            *(f"{value:+.4f}".replace("+nan", "–") for value in (item.azimuth_deg, item.elevation_deg)),
-            f"{item.range_m:+.2f}".replace("+nan", "–"),
-            "left out" if item.outlier else "",
-        )
-        for item in fitted.residuals
-    ]
-    print_table("left over", ("target", "azimuth °", "elevation °", "range m", ""), left)
-    if fitted.outliers:
-        say(f"Left out, because the others contradict: {', '.join(fitted.outliers)}.")
-    for drift in result.drifts:
-        moved = "has moved" if drift.is_significant else "has not moved beyond its uncertainty"
-        say(
-            f"{drift.target}, first to last of {drift.maps} maps, {moved}: azimuth {drift.azimuth_deg:+.4f}°, "
-            f"elevation {drift.elevation_deg:+.4f}°, range {drift.range_m:+.2f} m."
-        )

@@ -61,27 +61,54 @@ def retrieve(
 
 
 def _print(found: "Retrieved", *, quiet: bool) -> None:
-    from planner.analysis_files import told
+    from planner.analysis_files import ALONE, told, told_losses
     from planner.commands.table import print_table
 
     for scan, steps in found.steps.items():
         for note in (*found.notes[scan], *map(told, steps)):
             remark(f"{scan}: {note}", quiet=quiet)
+        for line in told_losses(found.lost[scan]) if scan not in found.alone else [ALONE]:
+            remark(f"{scan}: {'' if scan in found.alone else 'no wind for '}{line}", quiet=quiet)
     for pair, gaps in found.gaps.items():
         if gaps:
-            rows = [(f"{g.gap_s:g}", str(g.pairs), f"{g.share:.1%}", f"{g.median_gap_s:.2f}") for g in gaps]
-            print_table(
-                f"{pair}, rays paired within a time gap", ("gap s", "pairs", "of the rays", "median s"), rows
-            )
+            rows = [
+                (f"{g.gap_s:g}", str(g.pairs), f"{g.share:.1%}", f"{g.mean_gap_s:.2f}", f"{g.spread_mps:.3f}")
+                for g in gaps
+            ]
+            heads = ("longest gap s", "pairs", "of the rays", "mean gap s", "std in 10 min m/s")
+            print_table(f"{pair}: rays paired within a time gap", heads, rows)
 
 
 def _document(found: "Retrieved") -> dict[str, object]:
     return {
         "results": str(found.folder),
         "filters": {scan: [step._asdict() for step in steps] for scan, steps in found.steps.items()},
+        "without_wind": {scan: lost for scan, lost in found.lost.items() if lost},
+        "radial_speeds_alone": list(found.alone),
         "gaps": {
-            pair: [{"gap_s": g.gap_s, "pairs": g.pairs, "share": g.share} for g in gaps]
+            pair: [
+                {
+                    "gap_s": g.gap_s,
+                    "pairs": g.pairs,
+                    "share": g.share,
+                    "mean_gap_s": _known(g.mean_gap_s),
+                    "std_in_10min_mps": _known(g.spread_mps),
+                }
+                for g in gaps
+            ]
             for pair, gaps in found.gaps.items()
         },
-        "means": {f"{period_s:g}": len(table) for period_s, table in found.means.items()},
+        "attitude": {
+            scan: {
+                name: {key: _known(value) for key, value in drift._asdict().items()}
+                for name, drift in logged.drifts.items()
+            }
+            for scan, logged in found.drifts.items()
+        },
+        "means": {f"{period_s:g}": rows for period_s, rows in found.means.items()},
     }
+
+
+def _known(value: object) -> object:
+    """A number, or null where it is not known."""
+    return None if value != value else value

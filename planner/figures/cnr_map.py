@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geometry.angles import difference_deg
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from planner.cnr_fit import Mapped
 from planner.figures.canvas import canvas, image
 from planner.figures.names import shown
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 COLOURS = "cividis"  # from dark to light for every kind of colour vision
 FAINTEST_DB = -25.0
+CELLS_PER_STEP = 6  # of the picture, so that staggered rays are seen where they are
+MOST_CELLS = 600  # in either direction
 GATES_SHOWN = (-1.0, -0.5, 0.0, 0.5, 1.0)  # probe lengths from the target
 
 
@@ -45,19 +47,36 @@ def _aside(mapped: Mapped) -> tuple[FloatArray, FloatArray]:
     ), mapped.cnr_map.elevation_deg
 
 
-def _mosaic(axes: Any, mapped: Mapped, values: FloatArray, low: float, high: float) -> Any:
-    """Every ray as a tile of the size of the steps."""
-    from matplotlib.collections import PolyCollection
+def _nearest(mapped: Mapped) -> tuple[IntArray, tuple[float, float, float, float]]:
+    """(row, column) the nearest ray of each of the picture's cells, and their left, right, lower, upper edge [deg]."""
+    from scipy.spatial import KDTree
 
-    azimuth, elevation = _aside(mapped)
-    half = 0.5 * np.array([max(step, 1e-4) for step in mapped.cnr_map.step_deg])
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-    tiles = np.stack([azimuth, elevation], axis=1)[:, None, :] + corners
-    mosaic = PolyCollection(list(tiles), array=values, cmap=COLOURS, clim=(low, high), edgecolors="none")
-    mosaic.set_rasterized(True)
-    axes.add_collection(mosaic)
-    axes.set_xlim(tiles[..., 0].min(), tiles[..., 0].max())
-    axes.set_ylim(tiles[..., 1].min(), tiles[..., 1].max())
+    rays = np.stack(_aside(mapped), axis=1)
+    steps = np.array([max(step, 1e-4) for step in mapped.cnr_map.step_deg])
+    low, high = rays.min(axis=0) - 0.5 * steps, rays.max(axis=0) + 0.5 * steps
+    counts = np.clip(np.ceil(CELLS_PER_STEP * (high - low) / steps), 1, MOST_CELLS).astype(int)
+    middles = [
+        first + (np.arange(count) + 0.5) * (last - first) / count
+        for first, last, count in zip(low, high, counts, strict=True)
+    ]
+    grid = np.stack(np.meshgrid(*middles), axis=-1)
+    _, nearest = KDTree(rays / steps).query(grid / steps)
+    return nearest, (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
+
+
+def _mosaic(axes: Any, mapped: Mapped, values: FloatArray, low: float, high: float) -> Any:
+    """Every place in the colour of its nearest ray."""
+    nearest, extent = _nearest(mapped)
+    mosaic = axes.imshow(
+        values[nearest],
+        extent=extent,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+        cmap=COLOURS,
+        vmin=low,
+        vmax=high,
+    )
     axes.grid(visible=False)
     axes.ticklabel_format(useOffset=False)
     return mosaic
@@ -89,7 +108,7 @@ def _cross(axes: Any, mapped: Mapped) -> None:
 def _found(mapped: Mapped) -> str:
     found = mapped.found
     parts = [
-        f"{name} {value:.3f}±{std:.3f}°"
+        f"{name} {value:.4f}±{std:.4f}°"
         for name, value, std in (
             ("az", found.azimuth_deg, found.azimuth_std_deg),
             ("el", found.elevation_deg, found.elevation_std_deg),

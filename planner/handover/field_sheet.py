@@ -14,6 +14,7 @@ from geometry.angles import wrap_180_deg, wrap_360_deg
 from geometry.beams import beam_to
 from geometry.errors import InputError
 from planner import palette
+from planner.ground import ground_under_m
 from planner.handover.head_path import head_path
 from planner.places import Places
 from planner.plan import Plan
@@ -210,11 +211,13 @@ def position_rows(places: Places, lidar: Lidar) -> list[tuple[str, str]]:
     easting, northing, height = lidar.position
     longitude, latitude, _ = (float(value) for value in places.frame.geographic(lidar.position))
     above = "sea level" if site.height_datum == "above_sea_level" else "the ellipsoid"
+    ground_m = float(ground_under_m(site, lidar.position))
+    ground = f"{_above(height - ground_m)} the ground ({ground_m:.6g} m)"
     return [
         ("east, north", f"{easting:.3f} m, {northing:.3f} m ({site.crs})"),
         (
             "height",
-            f"{height:.3f} m above {above}, {_above(height - site.ground_m)} the ground ({site.ground_m:g} m)",
+            f"{height:.3f} m above {above}, {ground if math.isfinite(ground_m) else 'outside the terrain'}",
         ),
         ("lat., lon.", f"{degrees_minutes(latitude, 'NS')}, {degrees_minutes(longitude, 'EW')}"),
         ("", f"{latitude:.7f}, {longitude:.7f}"),

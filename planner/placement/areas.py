@@ -71,6 +71,11 @@ def distance_m(file: Path, crs: str, positions_m: FloatArray) -> FloatArray:
     return np.asarray(shapely.distance(points, shapely.union_all(_shapes(file, crs))))
 
 
+def far_cost(file: Path, crs: str, per_km: float, positions_m: FloatArray) -> FloatArray:
+    """What it costs to be far from the things of a file: (place,), so much for each kilometre."""
+    return np.asarray(per_km / 1000.0 * distance_m(file, crs, positions_m))
+
+
 def _inside_m(area: "Geometry", points: Any) -> FloatArray:
     """Distance to the edge of an area [m], positive inside."""
     import shapely

@@ -30,6 +30,9 @@ RETRIES = 5
 # How often what is done is written, in batches.
 SAVE_EVERY = 8
 
+# Steps of one search that a checkpoint holds: pairs, sets, refinement with turbulence.
+MOST_STEPS = 3
+
 CONNECT_S = 10.0  # how long a scheduler has to answer
 
 _shared: Any = None  # in a worker process: what all batches share
@@ -45,7 +48,13 @@ class How(NamedTuple):
 
 
 def run(
-    work: Work, shared: Any, batches: Sequence[Batch], *, how: How | None = None, expected_s: float = 0.0
+    work: Work,
+    shared: Any,
+    batches: Sequence[Batch],
+    *,
+    how: How | None = None,
+    expected_s: float = 0.0,
+    known_as: str = "",
 ) -> list[Any]:
     """Work on all batches.
 
@@ -61,6 +70,9 @@ def run(
         Where.
     expected_s
         How long all of it takes on one core, about; short work stays in this process.
+    known_as
+        What tells `shared` from that of other work, for the checkpoint. Default: its own bytes, which has to be arrays,
+        numbers and text then: those of a site differ from run to run.
 
     Returns
     -------
@@ -78,7 +90,7 @@ def run(
     [3, 6]
     """
     chosen = how or How()
-    key = _key(work, shared, batches) if chosen.checkpoint else ""
+    key = _key(work, known_as or shared, batches) if chosen.checkpoint else ""
     done = _load(chosen.checkpoint, key)
     rest = [batch for batch in batches if batch not in done]
     for number, (batch, result) in enumerate(_worked(work, shared, rest, chosen, expected_s), start=1):
@@ -184,17 +196,23 @@ def _key(work: Work, shared: Any, batches: Sequence[Batch]) -> str:
 
 
 def _load(path: Path | None, key: str) -> dict[Batch, Any]:
-    """What an earlier run has done; nothing if the file is of other work. The file is this program's own."""
+    """What an earlier run has done of this work; nothing if the file is of other work."""
+    return dict(_parts(path).get(key, {}))
+
+
+def _parts(path: Path | None) -> dict[str, dict[Batch, Any]]:
+    """The steps of a search by key, oldest first. The file is this program's own."""
     if path is None or not path.is_file():
         return {}
     try:
-        found = pickle.loads(path.read_bytes())
-    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError) as error:
+        return dict(pickle.loads(path.read_bytes()))
+    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, TypeError) as error:
         raise InputError(
             f"{path}: the progress file cannot be read ({error}); remove it to start anew"
         ) from error
-    return dict(found["done"]) if found["key"] == key else {}
 
 
 def _save(path: Path, key: str, done: dict[Batch, Any]) -> None:
-    write_bytes(path, pickle.dumps({"key": key, "done": done}))
+    """Add what is done to the file; a search has few steps, and of what is older nothing is kept."""
+    others = [item for item in _parts(path).items() if item[0] != key]
+    write_bytes(path, pickle.dumps(dict([*others[-(MOST_STEPS - 1) :], (key, done)])))

@@ -111,7 +111,7 @@ def default_grid(task: Task, *, count: int = GRID, reach_m: float | None = None)
         bounds = (*(low - reach), *(high + reach))
     west, south, east, north = bounds
     if task.terrain is not None:
-        edges = task.terrain.bounds_m
+        edges = task.terrain.ground.bounds_m
         west, south = max(west, edges[0]), max(south, edges[1])
         east, north = min(east, edges[2]), min(north, edges[3])
     return Grid(np.linspace(west, east, count), np.linspace(north, south, count))
@@ -123,7 +123,7 @@ def standing_m(task: Task, places_m: ArrayLike) -> FloatArray:
     if task.terrain is None:
         ground = np.full(len(places), task.site.ground_m)
     else:
-        ground = task.terrain.heights_m(places[:, 0], places[:, 1])
+        ground = task.terrain.ground.heights_m(places[:, 0], places[:, 1])
     return np.column_stack([places, ground + task.head_height_m])
 
 
@@ -158,7 +158,7 @@ def table_of(task: Task, seen: Look, *, lidar: Lidar | None = None) -> BeamTable
     return beam_table(
         seen.local_m,
         task.local_targets_m,
-        task.climates,
+        task.lean_climates,
         task.states,
         error_sources(lidar, lidar.radial_speed_noise_mps),
         criterion=task.criterion,
@@ -193,25 +193,6 @@ def of_lidar(task: Task, lidar: Lidar) -> Look:
     return look(task, np.array([lidar.position], dtype=np.float64))
 
 
-def check_terrain(task: Task) -> None:
-    """Refuse targets that the height raster does not hold.
-
-    Raises
-    ------
-    InputError
-        Naming them.
-    """
-    if task.terrain is None:
-        return
-    held = task.terrain.covers(task.targets_m[:, 0], task.targets_m[:, 1])
-    if not held.all():
-        names = ", ".join(name for name, inside in zip(task.targets, held, strict=True) if not inside)
-        raise InputError(
-            f"outside the height raster (west, south, east, north {tuple(round(b) for b in task.terrain.bounds_m)}): "
-            f"target {names}; give a raster that holds them"
-        )
-
-
 def _sight_slack_m(task: Task, local: FloatArray, range_m: FloatArray) -> FloatArray:
     """(target, place) how far the beams pass everything solid, less how far they may be off [m].
 
@@ -239,7 +220,8 @@ def _ends(task: Task, local: FloatArray) -> FloatArray:
     return np.asarray(local[:, None] + rays)
 
 
-def _solids(task: Task) -> list[tuple[str, Solids]]:
+@lru_cache(maxsize=4)
+def _solids(task: Task) -> tuple[tuple[str, Solids], ...]:
     """Everything solid on the site, in the local frame."""
     site, places = task.site, task.places
     found: list[tuple[str, Solids]] = []
@@ -257,7 +239,7 @@ def _solids(task: Task) -> list[tuple[str, Solids]]:
         )
     if site.obstacles:
         found.append(("obstacle", _boxes(task)))
-    return found
+    return tuple(found)
 
 
 def _boxes(task: Task) -> Boxes:
@@ -288,8 +270,7 @@ def _terrain_slack_m(task: Task, positions_m: FloatArray) -> FloatArray:
 def _horizons(task: Task) -> tuple[Horizon, ...]:
     if task.terrain is None:
         return ()
-    check_terrain(task)
-    return tuple(horizon(task.terrain, target) for target in task.targets_m)
+    return tuple(horizon(task.terrain.top, target) for target in task.targets_m)
 
 
 def _lost_share(

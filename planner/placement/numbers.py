@@ -15,6 +15,7 @@ from planner.scan_plans import SectorScan
 from planner.site import Lidar
 from planner.wind_climate import error_sources, turbulence
 from reconstruct.beam_table import Criterion, condensed
+from reconstruct.climate import Climate
 from reconstruct.rays import Rays
 from reconstruct.retrieval import gain, rows
 from reconstruct.turbulent import predict_turbulent
@@ -38,12 +39,26 @@ class Numbers(NamedTuple):
 
     def value(self, criterion: Criterion, aggregate: Aggregate) -> float:
         """What a search minimises, at these places."""
-        each = {
-            "vector": self.vector_std_mps,
-            "speed": self.speed_std_mps,
-            "direction": self.direction_std_deg,
-        }[criterion]
-        return float(each.max() if aggregate == "worst" else np.sqrt(np.mean(each**2)))
+        return _value(self.vector_std_mps, self.speed_std_mps, self.direction_std_deg, criterion, aggregate)
+
+
+class Turbulent(NamedTuple):
+    """Error of one retrieval with turbulence, root mean square over the climate; NaN where the tier gives none."""
+
+    speed_std_mps: FloatArray  # (target,)
+    direction_std_deg: FloatArray  # (target,)
+    vector_std_mps: FloatArray  # (target,) along and across the wind together
+
+    def value(self, criterion: Criterion, aggregate: Aggregate) -> float:
+        """What a search with turbulence minimises, at these places."""
+        return _value(self.vector_std_mps, self.speed_std_mps, self.direction_std_deg, criterion, aggregate)
+
+
+def _value(
+    vector: FloatArray, speed: FloatArray, direction: FloatArray, criterion: Criterion, aggregate: Aggregate
+) -> float:
+    each = {"vector": vector, "speed": speed, "direction": direction}[criterion]
+    return float(each.max() if aggregate == "worst" else np.sqrt(np.mean(each**2)))
 
 
 def numbers_of(task: Task, looks: Sequence[Look], *, sharing: int = 1) -> Numbers:
@@ -141,18 +156,21 @@ def _along_across(
     return float(along @ covariance @ along), float(across @ covariance @ across)
 
 
-def turbulent_numbers(task: Task, looks: Sequence[Look]) -> tuple[FloatArray, FloatArray]:
+def turbulent_numbers(
+    task: Task, looks: Sequence[Look], *, climates: Sequence[Climate] | None = None
+) -> Turbulent:
     """Error of one retrieval with turbulence, by the turbulent tier.
 
     Parameters
     ----------
     task, looks
         As for `numbers_of`.
+    climates
+        The wind at each target; default: the task's.
 
     Returns
     -------
-    tuple of FloatArray
-        Standard deviation of speed [m/s] and of direction [deg], (target,) each, over the climate.
+    Turbulent
 
     Raises
     ------
@@ -167,18 +185,22 @@ def turbulent_numbers(task: Task, looks: Sequence[Look]) -> tuple[FloatArray, Fl
         )
     lidars = [*task.fixed, *[task.pattern] * (len(looks) - len(task.fixed))]
     heads = np.concatenate([each.local_m for each in looks])
-    speed, direction = np.empty(len(task.targets)), np.empty(len(task.targets))
-    for number, (climate, like) in enumerate(zip(task.climates, task.states, strict=True)):
+    out = Turbulent(*(np.empty(len(task.targets)) for _ in Turbulent._fields))
+    for number, (climate, like) in enumerate(zip(climates or task.climates, task.states, strict=True)):
         rays = rays_at(task, number, heads)
         noise = [
             float(echo(lidar, task.scan_of(lidar), each.range_m).noise_mps[number, 0])
             for lidar, each in zip(lidars, looks, strict=True)
         ]
         sources = [error_sources(lidar, mps) for lidar, mps in zip(lidars, noise, strict=True)]
-        found = [predict_turbulent(rays, state, eddies, sources) for state in climate.states(like)]
-        speed[number] = np.sqrt(climate.mean([_square(each.speed_std_mps) for each in found]))
-        direction[number] = np.sqrt(climate.mean([_square(each.direction_std_deg) for each in found]))
-    return speed, direction
+        states = list(climate.states(like))
+        found = [predict_turbulent(rays, state, eddies, sources) for state in states]
+        along = np.array([_square(each.speed_std_mps) for each in found])
+        turned = np.array([_square(each.direction_std_deg) for each in found])
+        across = turned * np.radians([state.speed_mps for state in states]) ** 2
+        for values, squares in zip(out, (along, turned, along + across), strict=True):
+            values[number] = np.sqrt(climate.mean(squares))
+    return out
 
 
 def _square(value: float | None) -> float:

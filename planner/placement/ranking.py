@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,22 +15,24 @@ from planner.placement.maps import (
     CRITERIA,
     Grid,
     Look,
-    check_terrain,
     look,
     of_lidar,
     standing_m,
     table_of,
 )
-from planner.placement.numbers import Numbers, numbers_of, turbulent_numbers
+from planner.placement.numbers import Numbers, Turbulent, numbers_of, turbulent_numbers
 from planner.placement.refine import WORTH, Improve, SoftCost, binding, refined
+from planner.placement.steer import steered
 from planner.placement.task import Task, default_limits
 from planner.site import Lidar
 from reconstruct.beam_table import BeamTable
 
 PHYSICAL = ("range-min", "range-max", "terrain")
 APART_CELLS = 4.0  # two places this many cells of the grid apart are different ones
+Tier = Literal["linear", "turbulent"]
 WHAT = {"vector": "wind vector", "speed": "wind speed", "direction": "wind direction"}
 MOST = 5  # distinct optima
+JUDGED = 12  # distinct optima of the linear tier that the turbulent tier judges
 STARTS = 12  # beginnings of sets of more than two
 
 
@@ -41,6 +43,7 @@ class Ranked(NamedTuple):
     positions_m: FloatArray  # (lidar, 3) easting, northing, height of the head
     value: float  # what was minimised, in the criterion's unit, soft cost included
     numbers: Numbers
+    turbulent: Turbulent | None  # where the search was by the turbulent tier
     binds: tuple[
         str, ...
     ]  # constraints that keep it from being better; of the declared places: that they break
@@ -61,7 +64,13 @@ class Placement:
 
 
 def place(
-    task: Task, grid: Grid, *, how: How | None = None, cost: SoftCost | None = None, most: int = MOST
+    task: Task,
+    grid: Grid,
+    *,
+    how: How | None = None,
+    cost: SoftCost | None = None,
+    most: int = MOST,
+    tier: Tier = "linear",
 ) -> Placement:
     """Find the best places.
 
@@ -77,6 +86,9 @@ def place(
         Soft cost of a place in the criterion's unit, such as the distance to a road times what a metre is worth.
     most
         How many distinct optima.
+    tier
+        "turbulent": the best of the linear tier are judged by the error with turbulence, moved to where that is least and
+        ranked by it. The map of the error stays that of the linear tier.
 
     Returns
     -------
@@ -89,16 +101,19 @@ def place(
         If no place keeps to every constraint: with the constraint that leaves none, and how much it must give; or if a
         target lies outside the terrain.
     """
-    check_terrain(task)
     seen = look(task, standing_m(task, grid.places_m))
     improve = Improve(task, fixed_tables(task), grid.spacing_m, cost or _free)
-    error, sets = _searched(improve, seen, how, most)
+    error, sets = _searched(improve, seen, how, most if tier == "linear" else JUDGED)
     if not len(sets.members):
         raise InputError(refusal(task, seen, [table.seen for table in improve.fixed]))
     found = [refined(improve, seen.positions_m[members, :2]) for members in sets.members]
-    apart = _apart(found, APART_CELLS / 2 * grid.spacing_m)
-    ranked = tuple(_ranked(improve, *one, rank=rank) for rank, one in enumerate(apart, start=1))
-    declared = _declared(improve)
+    near_m = APART_CELLS / 2 * grid.spacing_m
+    apart = _apart(found, near_m)
+    if tier == "turbulent":
+        moved = steered(improve, [places for places, _ in apart], most=most, how=how)
+        apart = _apart(moved, near_m)
+    ranked = _in_order([_ranked(improve, places, value, tier) for places, value in apart])
+    declared = _declared(improve, tier)
     return Placement(task, grid, seen, error, ranked, declared, _why(task, ranked[0], declared))
 
 
@@ -156,15 +171,8 @@ def _searched(improve: Improve, seen: Look, how: How | None, most: int) -> tuple
     members: IntArray = starts.members if len(starts.members) else np.empty((1, 0), dtype=np.intp)
     if not improve.fixed and not len(starts.members):
         return error, search.Sets(np.empty((0, task.count), dtype=np.intp), np.empty(0))
-    sets = search.best_sets(
-        table,
-        improve.fixed,
-        members,
-        count=task.count,
-        cost=cost,
-        least_opening_deg=opening,
-        aggregate=task.aggregate,
-    )
+    tables = search.SetTables(table, tuple(improve.fixed), members, task.count, cost, opening, task.aggregate)
+    sets = search.best_sets(tables, how=how)
     return error, search.Sets(sets.members[:most], sets.value[:most])
 
 
@@ -202,40 +210,50 @@ def _apart(found: Sequence[Found], apart_m: float) -> list[Found]:
     return kept
 
 
-def _ranked(improve: Improve, places_m: FloatArray, value: float, *, rank: int) -> Ranked:
+def _ranked(improve: Improve, places_m: FloatArray, value: float, tier: Tier) -> Ranked:
     """One set with its numbers, the constraint that binds, and its line."""
     task = improve.task
     positions = np.concatenate([standing_m(task, place) for place in places_m])
-    numbers = numbers_of(
-        task,
-        [*(of_lidar(task, lidar) for lidar in task.fixed), *(look(task, one[None]) for one in positions)],
-    )
-    binds = binding(improve, places_m, value)
-    return Ranked(rank, positions, value, numbers, binds, _line(task, positions, numbers, binds))
+    looks = [*(of_lidar(task, lidar) for lidar in task.fixed), *(look(task, one[None]) for one in positions)]
+    numbers, turbulent = numbers_of(task, looks), None
+    binds = binding(improve, places_m, improve.value(places_m))
+    if tier == "turbulent":
+        turbulent = turbulent_numbers(task, looks)
+        value = turbulent.value(task.criterion, task.aggregate) + float(improve.cost(places_m).sum())
+    text = _line(task, positions, numbers, turbulent, binds)
+    return Ranked(0, positions, value, numbers, turbulent, binds, text)
 
 
-def _declared(improve: Improve) -> Ranked | None:
+def _in_order(found: Sequence[Ranked]) -> tuple[Ranked, ...]:
+    """Best first, numbered from 1."""
+    ordered = sorted(found, key=lambda item: item.value)
+    return tuple(item._replace(rank=rank) for rank, item in enumerate(ordered, start=1))
+
+
+def _declared(improve: Improve, tier: Tier) -> Ranked | None:
     """The lidars where the site has them, judged alike, whether or not they keep to the constraints."""
     task = improve.task
     if not task.replaced:
         return None
-    looks = [of_lidar(task, lidar) for lidar in task.replaced]
-    numbers = numbers_of(task, [*(of_lidar(task, lidar) for lidar in task.fixed), *looks])
+    replaced = [of_lidar(task, lidar) for lidar in task.replaced]
+    looks = [*(of_lidar(task, lidar) for lidar in task.fixed), *replaced]
+    numbers = numbers_of(task, looks)
+    turbulent = turbulent_numbers(task, looks) if tier == "turbulent" else None
     positions = np.array([lidar.position for lidar in task.replaced], dtype=np.float64)
-    broken = [name for one in looks for name, slack in one.slack.items() if not (slack >= 0.0).all()]
-    value = numbers.value(task.criterion, task.aggregate) + float(improve.cost(positions[:, :2]).sum())
-    return Ranked(
-        0, positions, value, numbers, tuple(dict.fromkeys(broken)), _line(task, positions, numbers, None)
-    )
+    broken = [name for one in replaced for name, slack in one.slack.items() if not (slack >= 0.0).all()]
+    soft = float(improve.cost(positions[:, :2]).sum())
+    value = (turbulent or numbers).value(task.criterion, task.aggregate) + soft
+    text = _line(task, positions, numbers, turbulent, None)
+    return Ranked(0, positions, value, numbers, turbulent, tuple(dict.fromkeys(broken)), text)
 
 
-def with_turbulence(task: Task, item: Ranked) -> tuple[FloatArray, FloatArray]:
-    """Speed [m/s] and direction [deg] error of one retrieval at each target, turbulence included."""
-    lidars = [of_lidar(task, lidar) for lidar in task.fixed]
-    return turbulent_numbers(task, [*lidars, *(look(task, one[None]) for one in item.positions_m)])
-
-
-def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str, ...] | None) -> str:
+def _line(
+    task: Task,
+    positions: FloatArray,
+    numbers: Numbers,
+    turbulent: Turbulent | None,
+    binds: tuple[str, ...] | None,
+) -> str:
     """What one set is, in a line."""
     spots = " and ".join(f"E {east:.0f} N {north:.0f}" for east, north, _ in positions)
     worst = int(np.argmax(numbers.speed_std_mps))
@@ -244,6 +262,9 @@ def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str,
     ]
     if len(task.targets) > 1:
         parts[0] += f" at the worst target ({task.targets[worst]} for speed)"
+    if turbulent is not None:
+        gusts = f"{turbulent.speed_std_mps.max():.3f} m/s and {turbulent.direction_std_deg.max():.2f}°"
+        parts.append(f"with turbulence {gusts}")
     if np.isfinite(numbers.opening_deg).all():
         parts.append(f"opening {_span(numbers.opening_deg, '°')}")
     placed = slice(len(task.fixed), None)
@@ -261,6 +282,24 @@ def _line(task: Task, positions: FloatArray, numbers: Numbers, binds: tuple[str,
 def _span(values: FloatArray, unit: str, digits: int = 0) -> str:
     low, high = f"{float(np.min(values)):.{digits}f}", f"{float(np.max(values)):.{digits}f}"
     return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+
+
+def _changes(best: Ranked, declared: Ranked) -> list[str]:
+    """The errors of the best against those of the declared, with turbulence first where that was asked for."""
+    old, new = declared.numbers, best.numbers
+    said = [
+        f"speed {new.speed_std_mps.max():.4f} against {old.speed_std_mps.max():.4f} m/s",
+        f"direction {new.direction_std_deg.max():.3f} against {old.direction_std_deg.max():.3f}°",
+    ]
+    if best.turbulent is None or declared.turbulent is None:
+        return said
+    after, before = best.turbulent, declared.turbulent
+    return [
+        f"with turbulence speed {after.speed_std_mps.max():.3f} against {before.speed_std_mps.max():.3f} m/s",
+        f"direction {after.direction_std_deg.max():.2f} against {before.direction_std_deg.max():.2f}°",
+        f"without it {said[0]}",
+        said[1],
+    ]
 
 
 def _why(task: Task, best: Ranked, declared: Ranked | None) -> str:
@@ -282,8 +321,7 @@ def _why(task: Task, best: Ranked, declared: Ranked | None) -> str:
         f"{verdict} than with {names} where declared"
         if change < -WORTH or change > WORTH
         else f"the error of the {WHAT[task.criterion]} is {verdict} as with {names} where declared",
-        f"speed {new.speed_std_mps.max():.4f} against {old.speed_std_mps.max():.4f} m/s",
-        f"direction {new.direction_std_deg.max():.3f} against {old.direction_std_deg.max():.3f}°",
+        *_changes(best, declared),
     ]
     if np.isfinite(new.opening_deg).all() and np.isfinite(old.opening_deg).all():
         reasons.append(

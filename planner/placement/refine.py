@@ -43,23 +43,28 @@ class Improve:
         soft = self.cost(seen.positions_m[:, :2])
         if task.single:
             return aggregated(single_variance(task, seen), task.aggregate) + soft
-        limits = task.limits
-        return soft + added_value(
-            [*self.fixed, *others],
-            table_of(task, seen),
-            least_opening_deg=limits.least_opening_deg,
-            aggregate=task.aggregate,
-        )
+        return soft + self.added([*self.fixed, *others], table_of(task, seen))
 
-    def table(self, places_m: FloatArray) -> BeamTable:
-        """What one lidar at a place (2,) contributes."""
-        return table_of(self.task, look(self.task, standing_m(self.task, places_m)))
+    def tables(self, places_m: FloatArray) -> list[BeamTable]:
+        """What each of some lidars at places (lidar, 2) contributes."""
+        if not len(places_m):
+            return []
+        table = table_of(self.task, look(self.task, standing_m(self.task, places_m)))
+        return [table.take([number]) for number in range(table.candidates)]
 
     def value(self, places_m: FloatArray) -> float:
         """Value of one set of places (lidar, 2), soft costs included."""
-        others = [] if self.task.single else [self.table(place) for place in places_m[:-1]]
-        last = look(self.task, standing_m(self.task, places_m[-1]))
-        return float(self.values(others, last)[0] + self.cost(places_m[:-1]).sum())
+        soft = float(self.cost(places_m).sum())
+        if self.task.single:
+            seen = look(self.task, standing_m(self.task, places_m))
+            return soft + float(aggregated(single_variance(self.task, seen), self.task.aggregate)[0])
+        *others, last = self.tables(places_m)
+        return soft + float(self.added([*self.fixed, *others], last)[0])
+
+    def added(self, others: Sequence[BeamTable], table: BeamTable) -> FloatArray:
+        """(candidate,) value with each candidate of a table added to others, without soft costs."""
+        opening = self.task.limits.least_opening_deg
+        return added_value(others, table, least_opening_deg=opening, aggregate=self.task.aggregate)
 
 
 def refined(improve: Improve, places_m: FloatArray, *, polish: bool = True) -> tuple[FloatArray, float]:
@@ -100,7 +105,7 @@ def _moved(
     """One lidar moved to the best of the places around it, if that is better."""
     rest = np.delete(places, number, axis=0)
     around = places[number] + step_m * AROUND
-    others = [] if improve.task.single else [improve.table(place) for place in rest]
+    others = [] if improve.task.single else improve.tables(rest)
     values = (
         improve.values(others, look(improve.task, standing_m(improve.task, around)))
         + improve.cost(rest).sum()
@@ -170,15 +175,9 @@ def _unconstrained(improve: Improve, rest: FloatArray, seen: Look) -> tuple[Floa
     known = Look(**{**vars(seen), "slack": {"none": np.zeros_like(seen.range_m)}})
     if task.single:
         return improve.values([], known), broken
-    others = [improve.table(place) for place in rest]
-    table = table_of(task, known)
-    free = added_value([*improve.fixed, *others], table, least_opening_deg=0.0, aggregate=task.aggregate)
-    crossing = added_value(
-        [*improve.fixed, *others],
-        table,
-        least_opening_deg=task.limits.least_opening_deg,
-        aggregate=task.aggregate,
-    )
+    others, table = [*improve.fixed, *improve.tables(rest)], table_of(task, known)
+    free = added_value(others, table, least_opening_deg=0.0, aggregate=task.aggregate)
+    crossing = improve.added(others, table)
     return free + improve.cost(seen.positions_m[:, :2]), {
         **broken,
         "opening": np.isinf(crossing) & np.isfinite(free),

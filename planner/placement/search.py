@@ -15,6 +15,10 @@ TILE = 256  # candidates whose pairs are worked on at once: half a megabyte a ma
 # Measured: one pair at one target, on one core.
 PAIR_TARGET_S = 3.5e-9
 
+# Measured: one member of a set at one target and candidate, on one core; and how many rounds of exchange it takes about.
+MEMBER_TARGET_S = 2e-8
+SET_ROUNDS = 4
+
 # Rounds of exchange of a set; each one is exhaustive in one member.
 EXCHANGES = 20
 
@@ -35,6 +39,18 @@ class PairTables(NamedTuple):
     table: BeamTable
     cost: FloatArray  # (candidate,) soft cost in the criterion's unit
     least_sine2: float
+    aggregate: Aggregate
+
+
+class SetTables(NamedTuple):
+    """What a search for sets of more than two shares among its batches."""
+
+    table: BeamTable  # of the candidates; one may miss some targets if others of the set see them
+    fixed: tuple[BeamTable, ...]  # of lidars that stand, one candidate each
+    starts: IntArray  # (start, lidar) beginnings, with none to `lidars` members each
+    lidars: int  # members of a set
+    cost: FloatArray  # (candidate,) soft cost in the criterion's unit
+    least_opening_deg: float  # of those two of a set that cross best
     aggregate: Aggregate
 
 
@@ -158,62 +174,47 @@ def near(sets_m: FloatArray, one_m: FloatArray, apart_m: float) -> BoolArray:
     return np.asarray(between.any(axis=2).all(axis=1) & between.any(axis=1).all(axis=1))
 
 
-def best_sets(
-    table: BeamTable,
-    fixed: Sequence[BeamTable],
-    starts: IntArray,
-    *,
-    count: int,
-    cost: FloatArray,
-    least_opening_deg: float,
-    aggregate: Aggregate,
-) -> Sets:
+def best_sets(tables: SetTables, *, how: How | None = None) -> Sets:
     """Sets of more than two, grown from good beginnings: the best member is added, then each is exchanged in turn.
 
     Every exchange looks at all candidates and keeps the rest, until none helps: a set that no single move betters.
-
-    Parameters
-    ----------
-    table
-        Of the candidates; one may miss some targets if others of the set see them.
-    fixed
-        Tables of lidars that stand, one candidate each.
-    starts
-        (start, lidar) beginnings, with none to `count` members each.
-    count
-        Members of a set.
-    cost
-        (candidate,) soft cost.
-    least_opening_deg
-        Of those two of a set that cross best.
-    aggregate
-        The worst target, or the mean.
 
     Returns
     -------
     Sets
         One for each start, best first, each only once.
     """
-
-    def value_of(others: list[int]) -> FloatArray:
-        rest = [*fixed, *(table.take([index]) for index in others)]
-        variance = np.where(
-            _crossing([*rest, table], least_opening_deg), set_variance([*rest, table]), UNSEEN
-        )
-        return np.asarray(aggregated(variance, aggregate) + cost + cost[others].sum())
-
-    found: dict[tuple[int, ...], float] = {}
-    for start in starts:
-        members = [int(index) for index in start]
-        while len(members) < count:
-            members.append(int(np.argmin(value_of(members))))
-        members, value = _exchanged(members, value_of)
-        found[tuple(sorted(members))] = value
-    ordered = [
-        item for item in sorted(found.items(), key=_by_value) if item[1] < np.sqrt(UNSEEN / table.targets)
-    ]
+    table, count = tables.table, tables.lidars
+    each_s = SET_ROUNDS * count**2 * table.candidates * table.targets * MEMBER_TARGET_S
+    size = max(int(np.ceil(LEAST_BATCH_S / each_s)), 1)
+    numbers = range(len(tables.starts))
+    batches = [tuple(numbers[start : start + size]) for start in range(0, len(numbers), size)]
+    parts = run(set_batch, tables, batches, how=how, expected_s=each_s * len(numbers))
+    found = dict(item for part in parts for item in part)
+    unseen = np.sqrt(UNSEEN / table.targets)
+    ordered = [item for item in sorted(found.items(), key=_by_value) if item[1] < unseen]
     indices = np.array([members for members, _ in ordered], dtype=np.intp).reshape(-1, count)
     return Sets(indices, np.array([value for _, value in ordered]))
+
+
+def set_batch(tables: SetTables, batch: Batch) -> list[tuple[tuple[int, ...], float]]:
+    """Members and value of the sets grown from some of the beginnings: a batch for `fan_out.run`."""
+    found = []
+    for number in batch:
+        members = [int(index) for index in tables.starts[number]]
+        while len(members) < tables.lidars:
+            members.append(int(np.argmin(_values_with(tables, members))))
+        members, value = _exchanged(members, lambda others: _values_with(tables, others))
+        found.append((tuple(sorted(members)), value))
+    return found
+
+
+def _values_with(tables: SetTables, others: list[int]) -> FloatArray:
+    """(candidate,) value of each candidate together with other candidates and the lidars that stand."""
+    members = [*tables.fixed, *(tables.table.take([index]) for index in others), tables.table]
+    crossing = _crossing(members, tables.least_opening_deg)
+    variance = np.where(crossing, set_variance(members), UNSEEN)
+    return np.asarray(aggregated(variance, tables.aggregate) + tables.cost + tables.cost[others].sum())
 
 
 def _by_value(item: tuple[tuple[int, ...], float]) -> tuple[float, tuple[int, ...]]:

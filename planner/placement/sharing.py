@@ -1,11 +1,14 @@
 """Several heights or targets for the same lidars: stacked elevations, split time, and the error that each gets."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
-from planner.placement.maps import Look
+from planner.placement.maps import Look, of_lidar
 from planner.placement.numbers import numbers_of
-from planner.placement.task import Task
+from planner.placement.task import Task, task_of
+from planner.scan_plans import SectorScan
+from planner.site import Site
 
 
 class Shared(NamedTuple):
@@ -18,6 +21,40 @@ class Shared(NamedTuple):
     direction_std_deg: float
     alone_speed_std_mps: float  # if it had the lidars for itself
     alone_direction_std_deg: float
+
+
+def shared_by(
+    site: Site, *, lidars: Sequence[str] = (), targets: Sequence[str] = ()
+) -> tuple[tuple[str, ...], tuple[Shared, ...]]:
+    """Split the time of a site's lidars, where they stand, among targets.
+
+    Parameters
+    ----------
+    site
+        With lidars and targets.
+    lidars, targets
+        Names; default: the lidars of the first pair, else all, and all targets. One lidar alone takes its sector scan.
+
+    Returns
+    -------
+    tuple
+        Names of the lidars, and what each target gets.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the lidars cannot measure the wind together.
+    """
+    pair = [site.scan(name).lidar for name in site.pairs[0].scans] if site.pairs else []
+    names = tuple(lidars) or tuple(pair) or tuple(lidar.name for lidar in site.lidars)
+    chosen = tuple(site.lidar(name) for name in names)
+    task = task_of(
+        site, fixed=names[:-1], count=1, targets=tuple(targets) or tuple(t.name for t in site.targets)
+    )
+    scans = [scan for scan in site.scans if scan.lidar == names[-1]]
+    own = next((scan for scan in scans if isinstance(scan, SectorScan)), None) if task.single else None
+    task = replace(task, pattern=chosen[-1], scan=own or next(iter(scans), None), replaced=())
+    return names, shared(task, [of_lidar(task, lidar) for lidar in chosen])
 
 
 def shared(task: Task, looks: Sequence[Look]) -> tuple[Shared, ...]:

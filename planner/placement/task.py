@@ -1,6 +1,6 @@
 """What is to be placed, for which targets, and what any place has to keep to."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -11,13 +11,13 @@ from geometry.arrays import FloatArray
 from geometry.disturbed import any_of, iec_excluded, jensen_excluded
 from geometry.errors import InputError
 from geometry.gates import Probe, unambiguous_range_m, window_ns
-from geometry.terrain import HeightRaster
+from planner.ground import Heights, ground_under_m, heights_of, refuse_unknown
 from planner.places import Places
 from planner.scan_layout import DEFAULT_FFT_POINTS, DEFAULT_PULSE_NS
 from planner.scan_plans import ScanPlan, SectorScan
 from planner.site import Lidar, Site
 from planner.wind_climate import climate_at, error_sources, state_like
-from reconstruct.beam_table import Criterion
+from reconstruct.beam_table import Criterion, condensed
 from reconstruct.climate import Climate
 from reconstruct.uncertainty import ErrorSources
 from reconstruct.wind import WindState
@@ -25,7 +25,7 @@ from reconstruct.wind import WindState
 Aggregate = Literal["worst", "mean"]
 
 # Beams that cross at less make an error that small pointing errors double: Vasiljević et al. (2020), Wind Energ. Sci. 5,
-# 73-87, plan with 30 degrees or more.
+# 73-87, doi:10.5194/wes-5-73-2020; 30 degrees is the least of their campaign-planning-tool.
 LEAST_OPENING_DEG = 30.0
 
 # The steepest beam for a horizontal wind: at 30 degrees a vertical wind enters with tan 30° = 0.58 of itself.
@@ -76,7 +76,7 @@ class Task:
     limits: Limits = field(default_factory=lambda: Limits(0.0, ORDINARY_RANGE_M))
     criterion: Criterion = "vector"
     aggregate: Aggregate = "worst"
-    terrain: HeightRaster | None = None
+    terrain: Heights | None = None
     head_height_m: float = HEAD_HEIGHT_M  # above the ground
 
     def __post_init__(self) -> None:
@@ -91,6 +91,8 @@ class Task:
                 "one lidar alone needs a scan of type sector to measure the wind, and none is declared; declare one, "
                 "name a lidar that already stands (--lidar), or place two (--count 2)"
             )
+        if self.terrain is not None:
+            refuse_unknown(self.terrain.ground, dict(zip(self.targets, self.targets_m, strict=True)))
 
     @property
     def single(self) -> bool:
@@ -112,19 +114,11 @@ class Task:
         """(target, 3) east, north, up from the site's origin [m]."""
         return self.places.local_m(self.targets_m)
 
-    def _site_at(self, number: int) -> Site:
-        """The site with the ground as it is under a target: its power law counts from there."""
-        if self.terrain is None:
-            return self.site
-        ground_m = float(self.terrain.heights_m(*self.targets_m[number, :2]))
-        return self.site.model_copy(update={"ground_height_m": ground_m, "terrain": None})
-
     @cached_property
     def climates(self) -> tuple[Climate, ...]:
         """The wind at each target: declared directions, else those free of wakes at the target itself."""
         return tuple(
-            climate_at(self._site_at(number), name, self._excluded(number))
-            for number, name in enumerate(self.targets)
+            climate_at(self.site, name, self._excluded(number)) for number, name in enumerate(self.targets)
         )
 
     def _excluded(self, number: int) -> SectorSet:
@@ -141,7 +135,13 @@ class Task:
     @cached_property
     def states(self) -> tuple[WindState, ...]:
         """Everything of the wind at each target but speed and direction."""
-        return tuple(state_like(self._site_at(number), name) for number, name in enumerate(self.targets))
+        return tuple(state_like(self.site, name) for name in self.targets)
+
+    @cached_property
+    def lean_climates(self) -> tuple[Climate, ...]:
+        """The same wind in as few states as give the same linear-tier mean of the criterion."""
+        pairs = zip(self.climates, self.states, strict=True)
+        return tuple(condensed(climate, like, self.criterion) for climate, like in pairs)
 
     @cached_property
     def sources(self) -> ErrorSources:
@@ -174,13 +174,6 @@ class Task:
         steps = round(self.scan.sector_deg / self.scan.step_deg)
         rays = steps if self.scan.motion == "continuous" else steps + 1
         return np.asarray((np.arange(rays) - 0.5 * (rays - 1)) * self.scan.step_deg)
-
-
-def on_terrain(task: Task, terrain: HeightRaster) -> Task:
-    """The task on a terrain: the head stands as high above it as the declared lidar does, 2 m where that is not known."""
-    east, north, head = task.pattern.position
-    height_m = head - float(terrain.heights_m(east, north))
-    return replace(task, terrain=terrain, head_height_m=height_m if height_m > 0 else HEAD_HEIGHT_M)
 
 
 def default_limits(lidar: Lidar, scan: ScanPlan | None) -> Limits:
@@ -251,7 +244,7 @@ def task_of(
     names = targets or ((pair.target,) if pair and not alone else tuple(item.name for item in site.targets))
     for name in names:
         site.target(name)
-    height_m = pattern.position[2] - site.ground_m
+    height_m = pattern.position[2] - float(ground_under_m(site, pattern.position))
     replaced = (pattern,) if number == 1 else tuple(site.lidar(name) for name in free[:number])
     return Task(
         site=site,
@@ -262,5 +255,6 @@ def task_of(
         scan=scan,
         replaced=replaced if len(replaced) == number else (),
         limits=default_limits(pattern, scan),
+        terrain=heights_of(site),
         head_height_m=height_m if height_m > 0 else HEAD_HEIGHT_M,
     )

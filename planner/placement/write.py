@@ -7,41 +7,16 @@ import numpy as np
 from geometry.arrays import FloatArray
 from planner.placement.maps import CRITERIA, Look
 from planner.placement.numbers import lidar_names
-from planner.placement.ranking import Placement, Ranked, with_turbulence
+from planner.placement.ranking import Placement, Ranked
 from planner.placement.search import UNSEEN
 
+TURBULENT = ("turbulent_speed_std_mps", "turbulent_direction_std_deg")
 UNIT = {"vector": "m/s", "speed": "m/s", "direction": "deg"}
 
 
-def rows_of(found: Placement, *, turbulent: bool = False) -> list[dict[str, object]]:
-    """One row for each ranked set and, with rank 0, for the declared places: what `--json` prints.
-
-    With `turbulent` each target has the turbulent tier's error of one retrieval as well.
-    """
-    items = [*([found.declared] if found.declared else []), *found.ranked]
-    rows = [_row(found, item) for item in items]
-    for row, item in zip(rows, items if turbulent else [], strict=False):
-        targets = row["targets"]
-        assert isinstance(targets, list)
-        for target, speed, direction in zip(targets, *with_turbulence(found.task, item), strict=True):
-            target["turbulent_speed_std_mps"] = _known(speed)
-            target["turbulent_direction_std_deg"] = _known(direction)
-    return rows
-
-
-def turbulent_lines(rows: list[dict[str, object]]) -> list[str]:
-    """The turbulent errors of rows, in words."""
-    lines = []
-    for row in rows:
-        targets = row["targets"]
-        assert isinstance(targets, list)
-        speeds = [item["turbulent_speed_std_mps"] for item in targets]
-        turns = [item["turbulent_direction_std_deg"] for item in targets]
-        known = all(value is not None for value in (*speeds, *turns))
-        name = f"{row['rank']}." if row["rank"] else "declared:"
-        said = f"speed {max(speeds):.3f} m/s, direction {max(turns):.2f}°" if known else "not known"
-        lines.append(f"{name} one retrieval with turbulence: {said}")
-    return lines
+def rows_of(found: Placement) -> list[dict[str, object]]:
+    """One row for each ranked set and, with rank 0, for the declared places: what `--json` prints."""
+    return [_row(found, item) for item in (*([found.declared] if found.declared else []), *found.ranked)]
 
 
 def _row(found: Placement, item: Ranked) -> dict[str, object]:
@@ -77,10 +52,21 @@ def _row(found: Placement, item: Ranked) -> dict[str, object]:
                 "azimuth_true_deg": numbers.azimuth_deg[number].tolist(),
                 "elevation_deg": numbers.elevation_deg[number].tolist(),
                 "lost_share": float(numbers.lost_share[number]),
+                **_with_turbulence(item, number),
             }
             for number, name in enumerate(task.targets)
         ],
         "text": item.text,
+    }
+
+
+def _with_turbulence(item: Ranked, number: int) -> dict[str, float | None]:
+    """The turbulent tier's error at one target, where it was asked for."""
+    if item.turbulent is None:
+        return {}
+    return {
+        "turbulent_speed_std_mps": _known(item.turbulent.speed_std_mps[number]),
+        "turbulent_direction_std_deg": _known(item.turbulent.direction_std_deg[number]),
     }
 
 
@@ -143,7 +129,8 @@ def _target_lines(row: dict[str, object], names: tuple[str, ...]) -> list[dict[s
         | {key: item[key][number] for key in ("azimuth_true_deg", "elevation_deg")}
         | {
             key: item[key]
-            for key in ("speed_std_mps", "direction_std_deg", "opening_angle_deg", "lost_share")
+            for key in ("speed_std_mps", "direction_std_deg", *TURBULENT, "opening_angle_deg", "lost_share")
+            if key in item
         }
         for item in targets
         for number, name in enumerate(names)

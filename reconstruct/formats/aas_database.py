@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 #: Rays that are fetched at once: with 41 gates some 800,000 rows.
 CHUNK_RAYS = 20_000
 
+#: Measurements that show where the gates are, and how near to one is on it [decametre].
+LOOKED_AT, SAME_GATE = 2_000, 0.005
+
 _NOTES = (
     "radial speeds turned from negative away to positive away",
     "ranges turned from decametres to metres",
@@ -76,20 +79,29 @@ def read_aas(place: str | Path, options: Options | None = None) -> Records:
 
 
 def aas_chunks(
-    place: str | Path, options: Options | None = None, *, rays: int = CHUNK_RAYS
+    place: str | Path,
+    options: Options | None = None,
+    *,
+    rays: int = CHUNK_RAYS,
+    range_m: float | None = None,
 ) -> Iterator[Records]:
-    """Rays of a database in order, scenario by scenario, in chunks that end where a sweep ends.
+    """Rays of a database in order, scenario by scenario, in chunks that end where a sweep ends if one ends in them.
 
     Parameters
     ----------
     place : str or Path
     options : Options, optional
     rays : int
-        That are fetched at once; a sweep that is longer is given whole.
+        That are fetched at once; no chunk is longer than twice as many. A sweep that is longer is cut: a stare
+        is one that never ends. Its parts keep its number.
+    range_m : float, optional
+        Only the gate that is nearest to this range, as the instrument states it, in the first rays of each
+        scenario [m]: nothing else is sent.
 
     Yields
     ------
     Records
+        Sweeps are numbered through within a scenario.
     """
     options = options or Options()
     with connected(place) as connection:
@@ -100,7 +112,8 @@ def aas_chunks(
         )
         for scenario in scenario_numbers(connection, held, options.scenario):
             attitude = _attitude(connection, held, scenario)
-            yield from _whole_sweeps(_fetched(connection, held, scenario, rays, options, attitude, name))
+            fetched = _fetched(connection, held, scenario, rays, options, attitude, name, range_m)
+            yield from _whole_sweeps(fetched, rays)
 
 
 def _attitude(
@@ -128,6 +141,7 @@ def _fetched(
     options: Options,
     attitude: dict[str, FloatArray],
     name: str,
+    range_m: float | None,
 ) -> Iterator[Records]:
     """Rays of a scenario as they are fetched, some at a time."""
     control, ray_query = select("control", held["control"])
@@ -135,6 +149,7 @@ def _fetched(
     key, other = control.c[held["control"]["gw_id"]], values.c[held["measurement"]["gw_id"]]
     ray_query = ray_query.where(control.c[held["control"]["scn_id"]] == scenario).order_by(key).limit(rays)
     last: int | None = None
+    gate: float | None = None
     while True:
         page = ray_query if last is None else ray_query.where(key > last)
         found = _frame(connection, page, held["control"])
@@ -142,10 +157,24 @@ def _fetched(
             return
         last = int(found["gw_id"].iloc[-1])
         within = value_query.where(other >= int(found["gw_id"].iloc[0])).where(other <= last)
+        if range_m is not None:
+            gate = _nearest_gate(connection, within, range_m) if gate is None else gate
+            distance = values.c[held["measurement"]["dist"]]
+            within = within.where(distance >= gate - SAME_GATE).where(distance <= gate + SAME_GATE)
         measured = _frame(connection, within, held["measurement"])
         records = _records(found, measured[measured["gw_id"].isin(found["gw_id"])], attitude, options)
         if records.rays:
             yield replace(records, instrument=name).mounted(options.mounting)
+
+
+def _nearest_gate(
+    connection: "sa.Connection", rows: "sa.Select[tuple[object, ...]]", range_m: float
+) -> float:
+    """Distance [decametre] of the gate that is nearest to a range, among the first rows of a query."""
+    found = connection.execute(rows.limit(LOOKED_AT)).mappings().all()
+    listed = [float(row["dist"]) for row in found if row["dist"] is not None]
+    wanted = range_m / METRES_IN_DECAMETRE
+    return min(listed, key=lambda distance: abs(distance - wanted), default=wanted)
 
 
 def _frame(
@@ -206,20 +235,21 @@ def _records(
     return replace(records.at_rays(order), time_utc=time[order])
 
 
-def _whole_sweeps(parts: Iterator[Records]) -> Iterator[Records]:
-    """The same rays cut where a sweep ends, with sweeps numbered through."""
+def _whole_sweeps(parts: Iterator[Records], rays: int) -> Iterator[Records]:
+    """The same rays cut where a sweep ends, with sweeps numbered through; no sweep longer than `rays` is held."""
     rest: Records | None = None
     number = 0
     for part in parts:
         every = part if rest is None else _end_to_end(rest, part)
         every = replace(every, sweep_id=sweep_ids(every.azimuth_deg, every.elevation_deg) + number)
-        last = every.sweep_id == every.sweep_id[-1]
-        if not np.all(last):
-            yield every.at_rays(~last)
-        rest, number = (
-            replace(every.at_rays(last), losses=()) if not np.all(last) else every,
-            int(every.sweep_id[-1]),
-        )
+        number = int(every.sweep_id[-1])
+        held = np.flatnonzero(every.sweep_id == number)
+        if len(held) > rays:  # two rays stay: they show which way the sweep goes on
+            held = held[-2:]
+        if held[0] > 0:
+            yield every.at_rays(slice(0, held[0]))
+            every = replace(every.at_rays(held), losses=())
+        rest = every
     if rest is not None:
         yield rest
 

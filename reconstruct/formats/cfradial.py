@@ -12,44 +12,43 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry.angles import wrap_180_deg
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError, UnavailableError
-from reconstruct.formats.carrier_to_noise import cnr_from_intensity
-from reconstruct.formats.gate_union import GateBlock, common_gates
+from reconstruct.formats.gate_union import on_one_set_of_gates
+from reconstruct.formats.netcdf_classic import missing_bytes
+from reconstruct.formats.netcdf_gates import in_units, read_gates
 from reconstruct.formats.netcdf_names import (
     AZIMUTH,
-    CNR,
     DURATION,
     ELEVATION,
-    INTENSITY,
-    QUALITY,
+    HEADING,
+    PITCH,
     RANGE,
+    ROLL,
     SPEED,
     SWEEP,
     TIME,
-    WIDTH,
     find,
     floats,
     times,
     to_number,
 )
-from reconstruct.formats.options import Options, Stamp
+from reconstruct.formats.options import Options
 from reconstruct.formats.over_the_top import folded
+from reconstruct.formats.own_netcdf import MARK, own_records
+from reconstruct.formats.ray_stamps import stamp_of, to_middle
 from reconstruct.formats.text import read_bytes, seconds_delta
-from reconstruct.losses import Loss, merged_losses
+from reconstruct.formats.time_order import time_order
+from reconstruct.losses import Loss, losses_text, merged_losses
 from reconstruct.records import Records, join
 from reconstruct.sweep_ids import sweep_ids
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Larger steps from ray to ray are a head that goes to its next point, not one that sweeps while it measures
-#: [deg].
-LARGEST_SWEPT_DEG = 10.0
 
-#: Words in a file's attributes by which a WindCube is known.
-WINDCUBE = ("windcube", "leosphere", "wls")
+#: A file is filled up to a multiple of four bytes: so many more than its numbers need are no damage.
+PADDING = 3
 
 
 def read_cfradial(path: Path, options: Options | None = None) -> Records:
@@ -74,10 +73,29 @@ def read_cfradial(path: Path, options: Options | None = None) -> Records:
         If the file is no netCDF, or lacks times, angles, ranges or radial speeds.
     """
     options = options or Options()
-    parts = [_sweep(data, root, path, options) for data, root in _datasets(path)]
-    return replace(join(parts), losses=merged_losses(loss for part in parts for loss in part.losses)).mounted(
-        options.mounting
-    )
+    datasets = _datasets(path)
+    if MARK in datasets[0][1]:
+        return _own(datasets[0][0], path, options)
+    parts, losses = [], []
+    for data, root in datasets:
+        try:
+            parts.append(_sweep(data, root, path, options))
+        except InputError as error:
+            if len(datasets) == 1:
+                raise
+            losses.append(Loss(path.name, f"a sweep: {str(error).removeprefix(f'{path}: ')}"))
+    if not parts:
+        raise InputError(f"{path}: no sweep can be read:\n{losses_text(merged_losses(losses))}")
+    records = join(on_one_set_of_gates(parts))
+    return replace(records, losses=merged_losses([*losses, *records.losses])).mounted(options.mounting)
+
+
+def _own(data: "xr.Dataset", path: Path, options: Options) -> Records:
+    """Records of a file that `own_netcdf` wrote: nothing has to be turned."""
+    records = own_records(data, path)
+    time = records.time_utc + seconds_delta(options.clock_offset_s)
+    instrument = options.instrument or records.instrument
+    return replace(records, time_utc=time, instrument=instrument).mounted(options.mounting)
 
 
 def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
@@ -89,7 +107,7 @@ def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
         raise UnavailableError(
             "netCDF files need the extra 'data' (xarray, netCDF4): pip install '.[data]'"
         ) from error
-    read_bytes(path)
+    _whole(path)
     try:
         with netCDF4.Dataset(str(path)) as file:
             root = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -97,7 +115,7 @@ def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
         opened = [
             xr.load_dataset(path, group=group, decode_times=False, engine="netcdf4") for group in groups
         ]
-    except (OSError, RuntimeError, ValueError, AttributeError) as error:
+    except Exception as error:  # of a damaged file the libraries raise whatever breaks first
         raise InputError(f"{path}: cannot be read as netCDF ({error})") from error
     held = [data for data in opened if find(data, SPEED) is not None and find(data, AZIMUTH) is not None]
     if not held:
@@ -108,6 +126,18 @@ def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
     if "time_reference" in opened[0].variables:
         root["time_reference"] = opened[0]["time_reference"].values
     return [(data, root) for data in held]
+
+
+def _whole(path: Path) -> None:
+    """Refuse a file that is cut off or shifted where the library would read zeros and other numbers."""
+    raw = read_bytes(path)
+    missing = missing_bytes(raw) if raw[:3] == b"CDF" else 0
+    if missing is not None and not -PADDING <= missing <= 0:
+        way = "fewer" if missing > 0 else "more"
+        raise InputError(
+            f"{path}: cannot be read as netCDF: it has {abs(missing)} bytes {way} than its header tells, so it "
+            "is cut off or damaged: fetch it again"
+        )
 
 
 def _groups(file: Any, above: str = "") -> list[str]:
@@ -125,112 +155,68 @@ def _sweep(data: "xr.Dataset", root: dict[str, Any], path: Path, options: Option
     if missing:
         raise InputError(f"{path}: holds radial speeds but no {' and no '.join(missing)}")
     time = times(data, root, path)
-    azimuth, elevation = (_per_ray(data, names, len(time)) for names in (AZIMUTH, ELEVATION))
-    range_m, values, notes = _gates(data, len(time), path)
-    known = ~np.isnat(time) & np.isfinite(azimuth) & np.isfinite(elevation)
-    losses = (
-        ()
-        if np.all(known)
-        else (Loss(path.name, "a ray without a time or an angle", times=int(np.sum(~known))),)
-    )
-    order = np.flatnonzero(known)[np.argsort(time[known], kind="stable")]
+    if not len(time):
+        raise InputError(f"{path}: holds no ray")
+    azimuth, elevation = (_angle(data, names, len(time), path) for names in (AZIMUTH, ELEVATION))
+    gates = read_gates(data, len(time), path)
+    known = np.isfinite(azimuth[0]) & (np.abs(elevation[0]) <= 360.0)
+    lost = int(np.sum(~known))
+    losses = [Loss(path.name, "a ray without azimuth or elevation", times=lost)] if lost else []
+    sorted_ = time_order(time[known], path.name)
+    order = np.flatnonzero(known)[sorted_.order]
     if not len(order):
         raise InputError(f"{path}: no ray has a time and angles")
-    azimuth, elevation, turned = folded(azimuth[order], elevation[order])
+    azimuth_deg, elevation_deg, turned = folded(azimuth[0][order], elevation[0][order])
     attributes = {**root, **data.attrs}
     said = attributes.get("instrument_name") or attributes.get("serial_number") or path.stem.split(".")[0]
     records = Records(
         time_utc=time[order] + seconds_delta(options.clock_offset_s),
-        duration_s=_durations(data, len(time))[order],
-        azimuth_deg=azimuth,
-        elevation_deg=elevation,
+        duration_s=_durations(data, len(time), path)[order],
+        azimuth_deg=azimuth_deg,
+        elevation_deg=elevation_deg,
         scan_id=np.full(len(order), to_number(attributes.get("scan_id"))),
-        sweep_id=_sweep_numbers(data, order, azimuth, elevation),
-        range_m=range_m,
+        sweep_id=_sweep_numbers(data, order, azimuth_deg, elevation_deg),
+        range_m=gates.range_m,
         instrument=options.instrument or str(said),
-        notes=(*notes, *turned),
-        losses=losses,
-        **{name: grid[order] for name, grid in values.items()},
+        notes=(*gates.notes, *azimuth[1], *elevation[1], *turned, *sorted_.notes),
+        losses=merged_losses([*losses, *gates.losses, *sorted_.losses]),
+        **{name: grid[order] for name, grid in gates.values.items()},
+        **_attitude(data, order, len(time)),
     )
-    return _to_middle(records, _stamp(attributes, options.stamp))
+    comments = " ".join(str(data[find(data, names)].attrs) for names in (TIME, AZIMUTH))
+    return to_middle(records, stamp_of(attributes, comments, options.stamp))
 
 
-def _stamp(attributes: dict[str, Any], asked: Stamp) -> Stamp:
-    """Where in the ray the stamps stand."""
-    if asked != "auto":
-        return asked
-    own = attributes.get("ray_stamp")
-    if own in ("start", "middle", "end"):
-        return str(own)  # type: ignore[return-value]
-    text = " ".join(
-        str(attributes.get(name, ""))
-        for name in ("title", "institution", "source", "instrument_name", "history")
-    )
-    return "end" if any(word in text.lower() for word in WINDCUBE) else "middle"
+def _angle(data: "xr.Dataset", names: tuple[str, ...], rays: int, path: Path) -> tuple[FloatArray, list[str]]:
+    """(ray,) azimuth or elevation [degrees], and what was turned."""
+    values, notes = in_units(data, find(data, names), "degrees")
+    return _per_ray(values, str(find(data, names)), rays, path), notes
 
 
-def _to_middle(records: Records, stamp: Stamp) -> Records:
-    """The same rays with time and angles of their middles."""
-    if stamp in ("middle", "auto") or not records.rays:
-        return replace(records, notes=(*records.notes, "times and angles as stored"))
-    half = 0.5 if stamp == "start" else -0.5
-    seconds = np.diff(records.time_utc) / np.timedelta64(1, "s")
-    usual = float(np.median(seconds)) if len(seconds) else 0.0
-    duration = np.where(np.isfinite(records.duration_s), records.duration_s, usual)
-    turn, lift = _swept(records, usual)
-    share = half * np.clip(duration / usual, 0.0, 1.0) if usual > 0 else np.zeros(records.rays)
-    azimuth, elevation, _ = folded(records.azimuth_deg + share * turn, records.elevation_deg + share * lift)
-    note = (
-        f"stamps turned from the {stamp} to the middle of the ray: time by "
-        f"{half * float(np.median(duration)):g} s, azimuth by "
-        f"{float(np.median(np.abs(share * turn))):.3f} deg, elevation by "
-        f"{float(np.median(np.abs(share * lift))):.3f} deg (median)"
-    )
-    time = records.time_utc + seconds_delta(half * duration)
-    order = np.argsort(time, kind="stable")
-    return replace(
-        records.at_rays(order),
-        time_utc=time[order],
-        azimuth_deg=azimuth[order],
-        elevation_deg=elevation[order],
-        duration_s=duration[order],
-        notes=(*records.notes, note),
-    )
+def _per_ray(values: FloatArray, name: str, rays: int, path: Path) -> FloatArray:
+    """(ray,) numbers of a variable that has one for each ray or one for all."""
+    if values.size not in (1, rays):
+        raise InputError(f"{path}: {name} has {values.size} values where there are {rays} rays")
+    return np.array(np.broadcast_to(values.ravel(), (rays,)))
 
 
-def _swept(records: Records, usual_s: float) -> tuple[FloatArray, FloatArray]:
-    """(ray,) turn of azimuth and elevation from the ray before, within a sweep; 0 where the head jumps or
-    stands [deg].
-    """
-    if records.rays < 2:
-        return np.zeros(records.rays), np.zeros(records.rays)
-    seconds = np.diff(records.time_utc) / np.timedelta64(1, "s")
-    turn, lift = np.asarray(wrap_180_deg(np.diff(records.azimuth_deg))), np.diff(records.elevation_deg)
-    sweeping = np.hypot(turn, lift) <= LARGEST_SWEPT_DEG
-    usable = sweeping & (np.diff(records.sweep_id) == 0) & (seconds < 2.5 * max(usual_s, 1e-9))
-    both = []
-    for step in (turn, lift):
-        own = np.where(usable, step, np.nan)
-        before, after = (
-            np.append(np.nan, own),
-            np.append(own, np.nan),
-        )  # the first ray of a sweep goes on as the next does
-        both.append(np.nan_to_num(np.where(np.isfinite(before), before, after)))
-    return both[0], both[1]
+def _attitude(data: "xr.Dataset", order: IntArray, rays: int) -> dict[str, Any]:
+    """Heading, pitch and roll of each ray, where the file logs them."""
+    names = {"heading_deg": HEADING, "pitch_deg": PITCH, "roll_deg": ROLL}
+    logged = {own: floats(data, name) for own, names_ in names.items() if (name := find(data, names_))}
+    return {
+        own: values.ravel()[order]
+        for own, values in logged.items()
+        if values.size == rays and np.any(np.isfinite(values))
+    }
 
 
-def _per_ray(data: "xr.Dataset", names: tuple[str, ...], rays: int) -> FloatArray:
-    values = floats(data, find(data, names)).ravel()
-    return values if len(values) == rays else np.full(rays, values[0] if len(values) else np.nan)
-
-
-def _durations(data: "xr.Dataset", rays: int) -> FloatArray:
+def _durations(data: "xr.Dataset", rays: int, path: Path) -> FloatArray:
     """(ray,) accumulation [s]; NaN where the file does not say."""
     name = find(data, DURATION)
     if name is None:
         return np.full(rays, np.nan)
-    milli = str(data[name].attrs.get("units", "s")).strip().lower() in ("ms", "milliseconds", "millisecond")
-    values = _per_ray(data, DURATION, rays) * (1e-3 if milli else 1.0)
+    values = _per_ray(in_units(data, name, "s")[0], name, rays, path)
     return np.where(values > 0, values, np.nan)
 
 
@@ -239,63 +225,13 @@ def _sweep_numbers(
 ) -> IntArray:
     """(ray,) as the file numbers its sweeps, where it has several; else from the angles."""
     own = find(data, SWEEP)
-    if own is not None and data[own].values.ndim == 1 and len(data[own].values) == len(order):
-        return np.asarray(data[own].values[order], dtype=np.intp)
+    if own is not None and data[own].values.ndim == 1 and len(data[own].values) > int(order.max()):
+        numbers = floats(data, own)[order]
+        if np.all(np.isfinite(numbers)):
+            return numbers.astype(np.intp)
     if "sweep_start_ray_index" in data:
         starts = floats(data, "sweep_start_ray_index").ravel()
         starts = starts[np.isfinite(starts)]
         if len(starts) > 1:
             return np.asarray(np.searchsorted(np.sort(starts), order, "right") - 1, dtype=np.intp)
     return sweep_ids(azimuth, elevation)
-
-
-def _gates(data: "xr.Dataset", rays: int, path: Path) -> tuple[FloatArray, dict[str, FloatArray], list[str]]:
-    """Ranges (gate,), quantities (ray, gate) and what was turned."""
-    ranges = floats(data, find(data, RANGE))
-    speed_name = find(data, SPEED)
-    toward = "toward" in str(data[speed_name].attrs.get("standard_name", ""))
-    found = {"radial_speed_mps": SPEED, "cnr_db": CNR, "spectral_width_mps": WIDTH, "quality": QUALITY}
-    values = {
-        own: _grid(data, find(data, names), rays, ranges, path)
-        for own, names in found.items()
-        if find(data, names)
-    }
-    notes = []
-    if toward:
-        values["radial_speed_mps"] = -values["radial_speed_mps"]
-        notes.append("radial speeds turned from positive toward to positive away")
-    if "cnr_db" not in values:
-        intensity = find(data, INTENSITY)
-        shape = values["radial_speed_mps"].shape
-        values["cnr_db"] = np.full(shape, np.nan)
-        if intensity:
-            values["cnr_db"] = cnr_from_intensity(_grid(data, intensity, rays, ranges, path))
-            notes.append("intensity turned into CNR = 10 log10(intensity - 1)")
-    if ranges.ndim == 2:
-        full = ranges if ranges.shape[0] == rays else ranges.T
-        block = GateBlock(full, np.stack(list(values.values()), axis=-1))
-        ranges, grids = common_gates([block])
-        return ranges, dict(zip(values, grids, strict=True)), notes
-    order = np.argsort(ranges, kind="stable")
-    return ranges[order], {name: grid[:, order] for name, grid in values.items()}, notes
-
-
-def _grid(data: "xr.Dataset", name: str | None, rays: int, ranges: FloatArray, path: Path) -> FloatArray:
-    """(ray, gate) of a variable, transposed or unpacked where it has to be."""
-    values = floats(data, name)
-    gates = ranges.shape[-1] if ranges.ndim == 1 or ranges.shape[0] == rays else ranges.shape[0]
-    if values.shape == (rays, gates):
-        return values
-    if values.shape == (gates, rays):
-        return values.T
-    if values.ndim == 1 and "ray_n_gates" in data and "ray_start_index" in data:
-        out = np.full((rays, gates), np.nan)
-        counts, starts = (
-            np.asarray(data[key].values, dtype=np.intp) for key in ("ray_n_gates", "ray_start_index")
-        )
-        for ray in range(rays):
-            out[ray, : counts[ray]] = values[starts[ray] : starts[ray] + counts[ray]]
-        return out
-    raise InputError(
-        f"{path}: {name} has the shape {values.shape} where {rays} rays and {gates} gates were expected"
-    )

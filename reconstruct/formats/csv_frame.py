@@ -29,7 +29,7 @@ def delimited_frame(
     Raises
     ------
     InputError
-        If there is no header line.
+        If there is no header line, or it names a column twice.
     """
     lines = lines_of(path)
     names = [cell.strip().strip('"') for cell in lines[0].split(separator)]
@@ -37,6 +37,9 @@ def delimited_frame(
         raise InputError(
             f"{path}: the first line {lines[0][:40]!r} is no header of columns separated by {separator!r}"
         )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"{path}: the header names the column {', '.join(map(repr, twice))} twice")
     widths = np.array([line.count(separator) + 1 if line.strip() else 0 for line in lines[1:]])
     good = widths == len(names)
     bad = np.flatnonzero((widths > 0) & ~good)

@@ -7,6 +7,10 @@ import numpy as np
 import pandas as pd
 
 from geometry.arrays import FloatArray
+from geometry.errors import InputError
+
+#: Cells of a grid that is made in any case; a larger one has to be filled by one row in so many.
+MOST_CELLS, FULLEST = 20_000_000, 100
 
 
 class GateTable(NamedTuple):
@@ -15,6 +19,7 @@ class GateTable(NamedTuple):
     first: pd.DataFrame  # one row for each ray, in rising order of its first key
     range_m: FloatArray  # (gate,)
     grids: dict[str, FloatArray]  # name: (ray, gate), NaN where the table has no row
+    doubles: int  # rows of a ray and gate that a row before has, too
 
 
 def gate_table(frame: pd.DataFrame, *, ray: list[str], gate: str, values: Sequence[str]) -> GateTable:
@@ -41,6 +46,11 @@ def gate_table(frame: pd.DataFrame, *, ray: list[str], gate: str, values: Sequen
     rays = frame.groupby(ray, sort=True, dropna=False).ngroup().to_numpy()
     ranges, column = np.unique(frame[gate].to_numpy(dtype=float), return_inverse=True)
     order = np.argsort(rays, kind="stable")
+    cells = (int(rays.max(initial=-1)) + 1) * len(ranges)
+    if cells > max(MOST_CELLS, FULLEST * len(frame)):
+        raise InputError(
+            f"{len(ranges)} different ranges in {len(frame)} rows: {gate!r} is no column of range gates"
+        )
     first = frame.iloc[order].iloc[np.flatnonzero(np.diff(rays[order], prepend=-1))]
     out = {}
     for name in values:
@@ -48,4 +58,7 @@ def gate_table(frame: pd.DataFrame, *, ray: list[str], gate: str, values: Sequen
         if name in frame.columns:
             grid[rays, column] = frame[name].to_numpy(dtype=float)
         out[name] = grid
-    return GateTable(first.reset_index(drop=True), ranges, out)
+    held = np.zeros((len(first), len(ranges)), dtype=bool)
+    held[rays, column] = True
+    doubles = len(frame) - int(held.sum())
+    return GateTable(first.reset_index(drop=True), ranges, out, doubles)

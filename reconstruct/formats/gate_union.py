@@ -1,12 +1,14 @@
 """One set of range gates for rays whose files list ranges ray by ray."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
+from reconstruct.records import Records, same_gates
 
 #: Different ranges that one table may have: more is a file whose ranges are no gates.
 MAX_GATES = 20_000
@@ -55,6 +57,23 @@ def common_gates(blocks: Sequence[GateBlock]) -> tuple[FloatArray, list[FloatArr
         )
     parts = [_placed(block, ranges) for block in blocks]
     return ranges, list(np.moveaxis(np.concatenate(parts), -1, 0))
+
+
+def on_one_set_of_gates(parts: Sequence[Records]) -> list[Records]:
+    """The same tables with the ranges of all of them, NaN where one has none, if they differ."""
+    if all(same_gates(parts[0], part) for part in parts):
+        return list(parts)
+    ranges = np.unique(np.concatenate([part.range_m for part in parts]))
+    note = f"the sweeps have different gates: put on all their {len(ranges)} ranges"
+    out = []
+    for part in parts:
+        place = np.searchsorted(ranges, part.range_m)
+        grids: dict[str, Any] = {}
+        for name, grid in part.gate_fields().items():
+            grids[name] = np.full((part.rays, len(ranges)), np.nan)
+            grids[name][:, place] = grid
+        out.append(replace(part, range_m=ranges, notes=(*part.notes, note), **grids))
+    return out
 
 
 def _placed(block: GateBlock, ranges: FloatArray) -> FloatArray:

@@ -1,12 +1,11 @@
-"""WindScanner's scanner and system files: where the head was and how it stood, by the counter of both
-files.
-"""
+"""WindScanner's scanner file: where the head was, by the counter that it shares with the wind file."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from geometry.angles import wrap_180_deg
 from geometry.arrays import BoolArray, FloatArray
 from reconstruct.formats.text import lines_of, number_tables
 from reconstruct.losses import Loss
@@ -14,8 +13,9 @@ from reconstruct.losses import Loss
 #: Fields of a scanner file: id; azimuth; elevation; counter.
 SCANNER_FIELDS = 4
 
-#: Fields of a system file: id; date; time; latitude; longitude; height; heading; pitch; roll; temperature.
-SYSTEM_FIELDS = 10
+#: A sample further than this from both of its neighbours, which agree, is damage: a head that turns its
+#: fastest, 100 degrees a second, comes 2 degrees further from sample to sample [deg].
+SPIKE_DEG = 10.0
 
 #: Share of a ray that the scanner file has to cover for its positions to count.
 LEAST_COVER = 0.9
@@ -49,8 +49,22 @@ def read_positions(path: Path) -> tuple[Positions, list[Loss]]:
     rows = rows[np.all(np.isfinite(rows), axis=1)]
     _, first = np.unique(rows[:, 0], return_index=True)
     rows = rows[first]
+    spikes = _spikes(rows[:, 1]) | _spikes(rows[:, 2])
+    if spikes.any():
+        text = f"a position {SPIKE_DEG:g} degrees or more off those before and after"
+        losses.append(Loss(path.name, text, times=int(spikes.sum())))
+    rows = rows[~spikes]
     azimuth = np.unwrap(rows[:, 1], period=360.0) if len(rows) else rows[:, 1]
     return Positions(rows[:, 0], azimuth, rows[:, 2]), losses
+
+
+def _spikes(angle_deg: FloatArray) -> BoolArray:
+    """(sample,) that stand alone."""
+    out = np.zeros(len(angle_deg), dtype=bool)
+    before, own, after = angle_deg[:-2], angle_deg[1:-1], angle_deg[2:]
+    off = np.minimum(*(np.abs(wrap_180_deg(own - other)) for other in (before, after)))
+    out[1:-1] = (off > SPIKE_DEG) & (np.abs(wrap_180_deg(after - before)) < SPIKE_DEG)
+    return out
 
 
 def ray_positions(log: Positions, start_id: FloatArray, stop_id: FloatArray) -> RayPositions:
@@ -83,41 +97,6 @@ def ray_positions(log: Positions, start_id: FloatArray, stop_id: FloatArray) -> 
     standing = bool(np.mean((turned[0] < STANDING_DEG) & (turned[1] < STANDING_DEG)) > 0.5)
     angles = [_at(log, k, stop_id) if standing else _mean(log, k, start_id, stop_id) for k in (1, 2)]
     return RayPositions(angles[0], angles[1], covered, standing)
-
-
-def read_attitude(path: Path, start_id: FloatArray, stop_id: FloatArray) -> tuple[dict[str, Any], list[Loss]]:
-    """Heading, pitch and roll of a `system.txt` at the middle of each ray.
-
-    Returns
-    -------
-    attitude : dict
-        heading_deg, pitch_deg and roll_deg (ray,); empty where the file has none.
-    losses : list of Loss
-    """
-    fields = [line.split(";") for line in lines_of(path)]
-    rows = [(row[0], *row[6:9]) for row in fields if len(row) >= SYSTEM_FIELDS]
-    bad = [n + 1 for n, row in enumerate(fields) if len(row) < SYSTEM_FIELDS and any(row)]
-    losses = (
-        [Loss(path.name, f"fewer than {SYSTEM_FIELDS} fields: the line is damaged", bad[0], len(bad))]
-        if bad
-        else []
-    )
-    values = np.array([[_number(cell) for cell in row] for row in rows]).reshape(-1, 4)
-    values = values[np.all(np.isfinite(values), axis=1)]
-    if not len(values):
-        return {}, losses
-    values = values[np.argsort(values[:, 0], kind="stable")]
-    middle = (start_id + stop_id) / 2
-    names = ("heading_deg", "pitch_deg", "roll_deg")
-    angles = [np.interp(middle, values[:, 0], np.unwrap(values[:, k + 1], period=360.0)) for k in range(3)]
-    return {name: np.mod(a + 180.0, 360.0) - 180.0 for name, a in zip(names, angles, strict=True)}, losses
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell.replace(",", ".") or "nan")
-    except ValueError:
-        return float("nan")
 
 
 def _at(log: Positions, axis: int, ids: FloatArray) -> FloatArray:

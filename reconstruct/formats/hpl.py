@@ -2,58 +2,52 @@
 
 A header of `name: value` lines ends at `****`; then each ray is one line (decimal hours, azimuth, elevation,
 and in most versions pitch, roll) and one line for each gate (gate, Doppler speed positive away, intensity =
-SNR + 1, backscatter, and in some versions the spectral width). Versions differ in the decimal sign, in "No.
-of rays" against "No. of waypoints", and in overlapping gates.
+SNR + 1, backscatter, and in some versions the spectral width, which the header need not mention). The
+variants are those that github.com/actris-cloudnet/doppy lists in docs/formats-halo.md and
+github.com/actris-cloudnet/halo-reader in raw-formats.md.
 """
 
-import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct.formats.carrier_to_noise import cnr_from_intensity
+from reconstruct.formats.hpl_header import Header, read_header
+from reconstruct.formats.number_rows import NumberRows, byte_lines, number_rows
 from reconstruct.formats.options import Options
 from reconstruct.formats.over_the_top import folded
-from reconstruct.formats.text import lines_of, seconds_delta
+from reconstruct.formats.text import plain_bytes, read_bytes, seconds_delta
+from reconstruct.formats.time_order import time_order
 from reconstruct.losses import Loss, merged_losses
 from reconstruct.records import Records, TimeArray
 from reconstruct.sweep_ids import sweep_ids
 
-#: Numbers of a ray's line without and with pitch and roll.
-RAY_NUMBERS = (3, 5)
-
-#: Numbers of a gate's line without and with spectral width.
-GATE_NUMBERS = (4, 5)
+#: Columns of a gate's line: gate, speed, intensity, backscatter, spectral width; of a ray's: hours, azimuth,
+#: elevation, pitch, roll. One more is room for a line that is too long.
+COLUMNS = 5
 
 #: Decimal hours count from midnight and may run on into the next day, not further.
 LATEST_HOUR = 48.0
 
-_START = re.compile(r"(\d{4})(\d{2})(\d{2})\s+(\d{1,2}):(\d{2}):(\d{2}(?:\.\d+)?)")
+#: Decimal hours that jump back by more begin a new day.
+HALF_DAY = 12.0
+
+#: A head that counts its turns does not come further than this many degrees.
+MOST_TURNED_DEG = 1e6
+
+#: Bytes that hold the header.
+HEADER_BYTES = 16_384
 
 
-@dataclass(frozen=True)
-class Header:
-    """What the header of a file says."""
-
-    gates: int
-    gate_length_m: float
-    points: int  # samples in a gate
-    pulses: int  # a ray; 0 where unknown
-    start: np.datetime64  # midnight of the day that decimal hours count from
-    overlapping: bool  # gates one sample apart
-    system: str = ""
-    scan_type: str = ""
-
-    @property
-    def range_m(self) -> FloatArray:
-        """(gate,) centres [m]: (gate + 0.5) lengths, or one sample apart where gates overlap."""
-        gate = np.arange(self.gates)
-        if self.overlapping:
-            return np.asarray(self.gate_length_m / 2 + gate * self.gate_length_m / self.points)
-        return np.asarray((gate + 0.5) * self.gate_length_m)
+class _Rays(NamedTuple):
+    ray: FloatArray  # (ray, 5) hours, azimuth, elevation, pitch, roll
+    gate: FloatArray  # (3, ray, gate) speed, intensity, spectral width
+    line: IntArray  # (ray,)
+    losses: list[Loss]
 
 
 def read_hpl(path: Path, options: Options | None = None) -> Records:
@@ -79,135 +73,154 @@ def read_hpl(path: Path, options: Options | None = None) -> Records:
         If the header lacks what is needed, or no ray is whole.
     """
     options = options or Options()
-    lines = lines_of(path)
-    header, body = read_header(lines, path)
-    text = [line.replace(",", ".") for line in lines[body:]]
-    rays, gates, losses = _rays(text, header, path.name, body)
-    if not len(rays):
-        raise InputError(f"{path}: no ray is whole: {header.gates} gate lines are needed after each ray line")
-    time = header.start + seconds_delta(_running_hours(rays[:, 0]) * 3600.0)
-    order = np.argsort(time, kind="stable")
-    rays, gates, time = rays[order], gates[order], time[order]
-    azimuth, elevation, notes = folded(rays[:, 1], rays[:, 2])
+    text = plain_bytes(read_bytes(path))
+    head = [line.decode("latin-1") for line in byte_lines(text[:HEADER_BYTES])]
+    header, first_line = read_header(head, path)
+    found = _rays(_body(text, first_line), header, path, first_line)
+    time = header.midnight + seconds_delta(_hours_of_day(found.ray[:, 0], header) * 3600.0)
+    sorted_ = time_order(time, path.name, found.line)
+    ray, gate, time = found.ray[sorted_.order], found.gate[:, sorted_.order], time[sorted_.order]
+    azimuth, elevation, turned = folded(ray[:, 1], ray[:, 2])
     records = Records(
         time_utc=time,
-        duration_s=np.full(len(rays), np.nan),
+        duration_s=np.full(len(ray), np.nan),
         azimuth_deg=azimuth,
         elevation_deg=elevation,
-        scan_id=np.zeros(len(rays), dtype=np.intp),
+        scan_id=np.zeros(len(ray), dtype=np.intp),
         sweep_id=sweep_ids(azimuth, elevation),
         range_m=header.range_m,
-        radial_speed_mps=gates[:, :, 1],
-        cnr_db=cnr_from_intensity(gates[:, :, 2]),
-        spectral_width_mps=gates[:, :, 4] if gates.shape[-1] > 4 else None,
-        pitch_deg=rays[:, 3] if rays.shape[1] > 4 else None,
-        roll_deg=rays[:, 4] if rays.shape[1] > 4 else None,
+        radial_speed_mps=gate[0],
+        cnr_db=cnr_from_intensity(gate[1]),
+        spectral_width_mps=_if_any(gate[2]),
+        pitch_deg=_if_any(ray[:, 3]),
+        roll_deg=_if_any(ray[:, 4]),
         instrument=options.instrument or header.system,
-        notes=("intensity turned into CNR = 10 log10(intensity - 1)", *notes),
-        losses=merged_losses(losses),
+        notes=(
+            "intensity turned into CNR = 10 log10(intensity - 1)",
+            *header.notes,
+            *turned,
+            *sorted_.notes,
+        ),
+        losses=merged_losses([*found.losses, *sorted_.losses]),
     )
     return _timed(records, header, options).mounted(options.mounting)
 
 
-def read_header(lines: list[str], path: Path) -> tuple[Header, int]:
-    """The header of a file and the index of the first line after it.
+def _body(text: bytes, first_line: int) -> bytes:
+    """The text after so many lines, with decimal points."""
+    start = 0
+    for _ in range(first_line):
+        ends = [end for end in (text.find(b"\n", start), text.find(b"\r", start)) if end >= 0]
+        end = min(ends, default=len(text) - 1)
+        start = end + 1 + (text[end : end + 2] == b"\r\n")
+    return text[start:].replace(b",", b".")
+
+
+def _rays(body: bytes, header: Header, path: Path, first_line: int) -> _Rays:
+    """Whole rays, and what was lost.
 
     Raises
     ------
     InputError
-        If the end of the header or one of its needed lines is missing.
+        If no ray is whole.
     """
-    end = next((n for n, line in enumerate(lines[:60]) if line.strip().startswith("****")), None)
-    if end is None:
+    rows = number_rows(body, COLUMNS)
+    whole = _whole(rows.values, header.gates, _cut(rows, body))
+    if not len(whole):
+        usual = _usual_gates(rows.values[:, 0])
+        came = f"mostly {usual} follow" if usual else "none follows"
         raise InputError(
-            f"{path}: no line '****' ends the header: this is no HALO .hpl file, or it is cut off"
+            f"{path}: no ray is whole: after each ray line {header.gates} gate lines are needed, as the "
+            f"header says, and {came}"
         )
-    pairs = [line.partition(":") for line in lines[:end] if ":" in line]
-    said = {name.strip().lower(): value.strip() for name, _, value in pairs}
-    gates = _number(said, "number of gates", path)
-    length = _number(said, "range gate length (m)", path)
-    points = float(said.get("gate length (pts)", "1").replace(",", ".") or 1)
-    if not (gates >= 1 and length > 0 and points >= 1):
-        raise InputError(
-            f"{path}: {gates:g} gates of {length:g} m and {points:g} points make no ray: all have to be "
-            "positive"
-        )
-    scan = said.get("scan type", "")
-    name = said.get("system id", "")
-    start = _start(said.get("start time", ""), path)
-    overlapping = scan.endswith("-overlapping") or "overlapping gates: 1" in " ".join(lines[:end]).lower()
-    pulses = re.sub(r"\D", "", said.get("pulses/ray", "")) or "0"
-    return Header(
-        int(gates), length, int(points), int(pulses), start, overlapping, f"HALO {name}".strip(), scan
-    ), end + 1
+    gate_rows = whole[:, None] + 1 + np.arange(header.gates)
+    used = np.zeros(len(rows.values), dtype=bool)
+    used[whole] = True
+    used[gate_rows] = True
+    losses = _losses(rows, used, header, path.name, first_line)
+    if len(whole) < header.rays:
+        text = f"rays that the header announces ({header.rays}) and the file does not hold whole"
+        losses.append(Loss(path.name, text, times=header.rays - len(whole)))
+    gate = np.stack([rows.values[:, column][gate_rows] for column in (1, 2, 4)])
+    return _Rays(rows.values[whole], gate, whole + first_line + 1, losses)
 
 
-def _number(said: dict[str, str], name: str, path: Path) -> float:
-    try:
-        return float(said[name].replace(",", "."))
-    except (KeyError, ValueError):
-        raise InputError(
-            f"{path}: the header says {said.get(name, 'nothing')!r} for {name!r}: a number is needed"
-        ) from None
+def _whole(values: FloatArray, gates: int, cut: BoolArray) -> IntArray:
+    """(ray,) rows of ray lines that all their gate lines follow."""
+    number = values[:, 0]
+    breaks = np.cumsum(np.concatenate([[True], np.diff(number) != 1]))  # a run of gates counts up by one
+    cut_before = np.concatenate([[0], np.cumsum(cut)])
+    wide_before = np.concatenate([[0], np.cumsum(np.isfinite(values[:, 4]))])
+    first = np.flatnonzero((number == 0) | (number == 1))
+    first = first[(first >= 1) & (first + gates <= len(number))]
+    last = first + gates - 1
+    wide = wide_before[last + 1] - wide_before[first]
+    sound = (breaks[first] == breaks[last]) & (cut_before[last + 1] == cut_before[first])
+    sound &= (wide == 0) | (wide == gates)
+    sound &= (number[first] == 0) | (breaks[first] != breaks[first - 1])
+    ray = first[sound] - 1
+    hours, azimuth, elevation = values[ray, 0], values[ray, 1], values[ray, 2]
+    sound = (hours >= 0) & (hours < LATEST_HOUR)
+    sound &= (np.abs(azimuth) < MOST_TURNED_DEG) & (np.abs(elevation) <= 360.0)
+    sound &= np.isfinite(values[ray, 3]) == np.isfinite(values[ray, 4])
+    ray = ray[sound]
+    apart = np.concatenate([[True], np.diff(ray) > gates]) if len(ray) else np.empty(0, dtype=bool)
+    return np.asarray(ray[apart], dtype=np.intp)
 
 
-def _start(text: str, path: Path) -> np.datetime64:
-    found = _START.search(text.replace(",", "."))
-    if found is None:
-        raise InputError(
-            f"{path}: the start time is {text!r}: a date and time like '20190308 20:05:03.76' is needed"
-        )
-    try:
-        return np.datetime64("-".join(found.groups()[:3]), "ns")
-    except ValueError:
-        raise InputError(f"{path}: the start time {text!r} is no date") from None
+def _cut(rows: NumberRows, body: bytes) -> BoolArray:
+    """(row,) whether a line has too few fields for a gate; one that holds NaN in words has not."""
+    short: BoolArray = ~np.all(np.isfinite(rows.values[:, 1:4]), axis=1)
+    doubtful = np.flatnonzero(short & np.isfinite(rows.values[:, 0]) & (rows.values[:, 0] % 1 == 0))
+    if len(doubtful):
+        lines = byte_lines(body)
+        fields = np.array([len(lines[n].split()) for n in doubtful])
+        short[doubtful[fields >= COLUMNS - 1]] = False
+    return short
 
 
-def _rays(
-    text: list[str], header: Header, where: str, offset: int
-) -> tuple[FloatArray, FloatArray, list[Loss]]:
-    """Numbers of the rays (ray, number) and of their gates (ray, gate, number), and what was lost."""
-    cells = [line.split() for line in text]
-    while cells and not cells[-1]:
-        cells.pop()
-    block = header.gates + 1
-    good, losses = [], []
-    n = 0
-    while n < len(cells):
-        if _is_ray(cells, n, header.gates):
-            good.append(n)
-            n += block
-            continue
-        if cells[n]:
-            losses.append(Loss(where, f"part of no whole ray of {header.gates} gates", n + offset + 1))
-        n += 1
-    widths = {len(cells[n]) for n in good}, {len(cells[n + 1]) for n in good}
-    ray_width, gate_width = (min(w, default=0) for w in widths)
-    rays = np.array([cells[n][:ray_width] for n in good], dtype=float).reshape(len(good), ray_width)
-    flat = [cell for n in good for row in cells[n + 1 : n + block] for cell in row[:gate_width]]
-    return rays, np.array(flat, dtype=float).reshape(len(good), header.gates, gate_width), losses
+def _usual_gates(number: FloatArray) -> int:
+    """How many gate lines mostly follow each other; 0 if none does."""
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(number) != 1, [True]]))
+    lengths = np.diff(starts)[(number[starts[:-1]] == 0) | (number[starts[:-1]] == 1)]
+    return int(np.bincount(lengths).argmax()) if len(lengths) else 0
 
 
-def _is_ray(cells: list[list[str]], n: int, gates: int) -> bool:
-    """Whether a ray line stands there with all its gate lines after it."""
-    if len(cells[n]) not in RAY_NUMBERS or n + gates >= len(cells):
-        return False
-    rows = cells[n + 1 : n + 1 + gates]
-    width = len(rows[0])
-    if width not in GATE_NUMBERS or any(len(row) != width for row in rows):
-        return False
-    try:
-        numbers = [row[0] for row in rows]
-        hour = float(np.array(cells[n], dtype=float)[0])
-        np.array(rows, dtype=float)
-        return 0 <= hour < LATEST_HOUR and int(numbers[-1]) - int(numbers[0]) == gates - 1
-    except ValueError:
-        return False
+def _losses(rows: NumberRows, used: BoolArray, header: Header, where: str, first_line: int) -> list[Loss]:
+    """Lines that are in no whole ray."""
+    wrong = np.zeros(len(used), dtype=bool)
+    wrong[rows.wrong] = True
+    left = np.flatnonzero(~used & np.isfinite(rows.values).any(axis=1))
+    losses = []
+    if len(rows.wrong):
+        text = "a line that holds something else than numbers, or too many"
+        losses.append(Loss(where, text, int(rows.wrong[0]) + first_line + 1, len(rows.wrong)))
+    if len(left):
+        text = f"a line in no whole ray of {header.gates} gates"
+        losses.append(Loss(where, text, int(left[0]) + first_line + 1, len(left)))
+    return losses
 
 
-def _running_hours(hours: FloatArray) -> FloatArray:
-    """Decimal hours that go on over midnight instead of beginning again."""
-    return np.asarray(hours + 24.0 * np.concatenate([[0], np.cumsum(np.diff(hours) < -12.0)]))
+def _hours_of_day(hours: FloatArray, header: Header) -> FloatArray:
+    """Decimal hours from the midnight of the header's day, that go on over midnight instead of beginning
+    again.
+
+    A stamp just after midnight in a file begun just before it counts on, and the other way round.
+    """
+    into_day = (header.start_utc - header.midnight) / np.timedelta64(1, "h")
+    steps = np.diff(hours, prepend=into_day)
+    days, day = np.zeros(len(hours)), 0
+    for ray in np.flatnonzero(np.abs(steps) > HALF_DAY):
+        if steps[ray] < 0:
+            day += 1
+        elif day > 0 or ray == 0:  # a damaged stamp that looked like midnight; else a gap of half a day
+            day -= 1
+        days[ray:] = day
+    return np.asarray(hours + 24.0 * days)
+
+
+def _if_any(values: FloatArray) -> FloatArray | None:
+    return values if np.isfinite(values).any() else None
 
 
 def _timed(records: Records, header: Header, options: Options) -> Records:

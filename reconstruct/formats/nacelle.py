@@ -5,6 +5,7 @@ speed is positive **toward** the lidar. The file does not say where the lines of
 told.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,17 @@ from reconstruct.formats.csv_frame import delimited_frame, to_times
 from reconstruct.formats.gate_table import gate_table
 from reconstruct.formats.options import Options
 from reconstruct.formats.over_the_top import folded
-from reconstruct.formats.text import seconds_delta
+from reconstruct.formats.text import lines_of, seconds_delta
 from reconstruct.losses import Loss
 from reconstruct.records import Records, TimeArray
 
 #: Columns without which there is no ray.
 NEEDED = ("Timestamp", "LOSindex", "Distance", "RWS")
+
+#: Our spelling of a column, by the file's in small letters without blanks, underscores and units.
+SPELLINGS = {
+    name.lower(): name for name in (*NEEDED, "DRWS", "CNR", "Tilt", "Roll", "RWSStatus", "OverrunStatus")
+} | {"dateandtime": "Timestamp", "datetime": "Timestamp", "los": "LOSindex", "losid": "LOSindex"}
 
 #: Numbers from here on stand for nothing.
 FILL = 9990.0
@@ -50,7 +56,9 @@ def read_nacelle(path: Path, options: Options | None = None) -> Records:
         If a needed column is missing, nothing is left, or a line of sight has no azimuth.
     """
     options = options or Options()
-    frame, losses = delimited_frame(path)
+    separator = separator_of(lines_of(path)[0])
+    frame, losses = delimited_frame(path, separator=separator, decimal="," if separator == ";" else ".")
+    frame = frame.rename(columns={name: spelled(name) for name in frame.columns})
     missing = [name for name in NEEDED if name not in frame.columns]
     if missing:
         raise InputError(
@@ -63,6 +71,10 @@ def read_nacelle(path: Path, options: Options | None = None) -> Records:
             f"{path}: no row is left: {'; '.join(str(loss) for loss in [*losses, *dropped]) or 'it has none'}"
         )
     table = gate_table(kept, ray=["Timestamp", "LOSindex"], gate="Distance", values=("RWS", "CNR", "DRWS"))
+    if table.doubles:
+        dropped.append(
+            Loss(path.name, "a time, line of sight and distance that come twice", times=table.doubles)
+        )
     lines = table.first["LOSindex"].to_numpy(dtype=np.intp)
     azimuth, elevation, _ = folded(
         _azimuths(lines, path, options), np.full(len(lines), options.elevation_deg or 0.0)
@@ -88,6 +100,29 @@ def read_nacelle(path: Path, options: Options | None = None) -> Records:
     return records.mounted(options.mounting)
 
 
+def spelled(column: str) -> str:
+    """A column's name as we spell it.
+
+    Examples
+    --------
+    >>> spelled("LOS index"), spelled("RWS [m/s]"), spelled("Height")
+    ('LOSindex', 'RWS', 'Height')
+    """
+    plain = re.sub(r"\[.*?\]|\(.*?\)|[\s_]", "", column).lower()
+    return SPELLINGS.get(plain, column)
+
+
+def separator_of(line: str) -> str:
+    """What stands between the columns of a header line.
+
+    Examples
+    --------
+    >>> separator_of("Timestamp;LOSindex;RWS")
+    ';'
+    """
+    return max((",", ";", "\t"), key=line.count)
+
+
 def _quality(frame: pd.DataFrame, where: str, limit_deg: float) -> tuple[pd.DataFrame, list[Loss]]:
     """Rows that pass, and how many each rule dropped."""
     speed = frame["RWS"].to_numpy(dtype=float)
@@ -96,7 +131,7 @@ def _quality(frame: pd.DataFrame, where: str, limit_deg: float) -> tuple[pd.Data
         np.isfinite(numbers) & (np.abs(numbers) < FILL), axis=1
     )
     rules: list[tuple[str, BoolArray]] = [
-        ("no time, line of sight or distance", known),
+        ("no time, line of sight or distance", known & (numbers[:, 0] % 1 == 0) & (numbers[:, 1] >= 0)),
         ("no radial speed (a fill value)", np.isfinite(speed) & (np.abs(speed) < FILL)),
     ]
     if "RWSStatus" in frame:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 #: Each quantity: names of variables, most telling first, then standard names.
 TIME = ("time", "timestamp", "time_offset")
-AZIMUTH = ("azimuth", "azimuth_angle", "sensor_azimuth_angle", "ray_azimuth_angle")
-ELEVATION = ("elevation", "elevation_angle", "sensor_elevation_angle", "ray_elevation_angle")
+AZIMUTH = ("azimuth", "azi", "azimuth_angle", "sensor_azimuth_angle", "ray_azimuth_angle")
+ELEVATION = ("elevation", "ele", "elevation_angle", "sensor_elevation_angle", "ray_elevation_angle")
 RANGE = ("range", "range_gate", "gate_range", "distance", "radial_distance", "projection_range_coordinate")
 SPEED = (
     "radial_wind_speed",
@@ -27,6 +27,8 @@ SPEED = (
     "doppler_velocity",
     "VEL",
     "VR",
+    "VRADH",
+    "VRAD",
     "radial_speed",
     "v",
     "dv",
@@ -39,10 +41,14 @@ WIDTH = ("doppler_spectrum_width", "spectrum_width", "spectral_width", "WIDTH", 
 QUALITY = ("radial_wind_speed_ci", "radial_wind_speed_status", "quality")
 DURATION = ("ray_accumulation_time", "accumulation_time", "ray_duration")
 SWEEP = ("ray_sweep_number",)
+HEADING = ("heading", "platform_yaw", "platform_orientation")
+PITCH = ("pitch", "platform_pitch", "platform_pitch_fore_up")
+ROLL = ("roll", "platform_roll", "platform_roll_starboard_down")
 
 _SINCE = re.compile(
     r"(?P<unit>\w+)\s+since\s+(?P<date>\d{4}-\d{1,2}-\d{1,2})"
     r"(?:[T ]+(?P<clock>\d{1,2}:\d{2}(?::\d{2}(?:\.\d+)?)?))?"
+    r"\s*(?:Z|UTC|(?P<way>[-+])?(?P<ahead_h>\d{1,2}):?(?P<ahead_min>\d{2}))?"
 )
 
 _SECONDS = {
@@ -91,9 +97,9 @@ def times(data: "xr.Dataset", root: dict[str, Any], path: Path) -> TimeArray:
     variable = data[find(data, TIME)]
     values = np.asarray(variable)
     if values.dtype.kind in "SUO":
-        return np.asarray(
-            pd.to_datetime(values.astype(str), utc=True).tz_localize(None), dtype="datetime64[ns]"
-        )
+        words = [_text(value) for value in values.ravel()]
+        parsed = pd.to_datetime(words, utc=True, errors="coerce", format="ISO8601")
+        return np.asarray(parsed.tz_localize(None), dtype="datetime64[ns]")
     reference = (
         data["time_reference"].to_numpy()
         if "time_reference" in data.variables
@@ -110,8 +116,13 @@ def times(data: "xr.Dataset", root: dict[str, Any], path: Path) -> TimeArray:
         )
     year, month, day = found["date"].split("-")
     hour, _, rest = (found["clock"] or "00:00").partition(":")
-    start = np.datetime64(f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest}", "ns")
-    seconds = floats(data, find(data, TIME)) * _SECONDS[found["unit"]]
+    try:
+        start = np.datetime64(f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest}", "ns")
+    except ValueError:
+        raise InputError(f"{path}: the times count in {units!r}, which is no date") from None
+    ahead_s = 3600.0 * int(found["ahead_h"] or 0) + 60.0 * int(found["ahead_min"] or 0)
+    ahead_s *= -1.0 if found["way"] == "-" else 1.0
+    seconds = floats(data, find(data, TIME)) * _SECONDS[found["unit"]] - ahead_s  # a zone ahead of UTC
     known = np.isfinite(seconds)
     return np.where(known, start + seconds_delta(np.where(known, seconds, 0.0)), np.datetime64("NaT", "ns"))
 

@@ -57,11 +57,11 @@ def read_plain_csv(path: Path, options: Options | None = None) -> Records:
     table, dropped = _usable(table, path.name)
     if table.empty:
         raise InputError(f"{path}: no row has a time, angles and a range")
-    records = _records(table, options)
+    records = _records(table, options, path.name)
     notes += ["columns renamed by the column map"]
-    return replace(records, notes=(*records.notes, *notes), losses=(*losses, *dropped)).mounted(
-        options.mounting
-    )
+    return replace(
+        records, notes=(*records.notes, *notes), losses=(*losses, *dropped, *records.losses)
+    ).mounted(options.mounting)
 
 
 def _own(path: Path, options: Options) -> Records:
@@ -118,7 +118,7 @@ def _usable(table: "pd.DataFrame", where: str) -> "tuple[pd.DataFrame, list[Loss
     return table[known], [Loss(where, "no time, angle or range", first, int(np.sum(~known)))]
 
 
-def _records(table: "pd.DataFrame", options: Options) -> Records:
+def _records(table: "pd.DataFrame", options: Options, where: str) -> Records:
     keys = ["time_utc", "azimuth_deg", "elevation_deg"]
     grid = gate_table(table, ray=keys, gate="range_m", values=GATE_FIELDS)
     first = grid.first
@@ -149,6 +149,7 @@ def _records(table: "pd.DataFrame", options: Options) -> Records:
         range_m=grid.range_m,
         instrument=options.instrument or "",
         notes=tuple(notes),
+        losses=(Loss(where, "a ray and range that come twice", times=grid.doubles),) if grid.doubles else (),
         **values,
     )
     return replace(records.at_rays(order), time_utc=time[order])

@@ -11,12 +11,14 @@ from typing import Literal, NamedTuple, get_args
 from geometry.errors import InputError, UnavailableError
 from reconstruct.formats.aas_database import read_aas
 from reconstruct.formats.cfradial import read_cfradial
+from reconstruct.formats.foreign import foreign
 from reconstruct.formats.hpl import read_hpl
-from reconstruct.formats.nacelle import read_nacelle
+from reconstruct.formats.nacelle import read_nacelle, spelled
 from reconstruct.formats.options import Options
 from reconstruct.formats.plain_csv import read_plain_csv
 from reconstruct.formats.text import decode, read_bytes, split_lines
-from reconstruct.formats.windscanner import EARLIEST_S, read_windscanner
+from reconstruct.formats.wind_lines import EARLIEST_S
+from reconstruct.formats.windscanner import read_windscanner
 from reconstruct.losses import Loss, losses_text, merged_losses
 from reconstruct.record_tables import read_parquet
 from reconstruct.records import Records, join, same_gates
@@ -24,10 +26,20 @@ from reconstruct.store import read_store
 
 Kind = Literal["windscanner", "cfradial", "hpl", "nacelle", "csv", "database", "store", "parquet"]
 
+#: What a file is said to be.
+LABELS: dict[str, str] = {
+    "windscanner": "a WindScanner wind file",
+    "cfradial": "netCDF of a scanning lidar (WindCube, CfRadial, ARM)",
+    "hpl": "a HALO StreamLine .hpl file",
+    "nacelle": "a CSV of a nacelle lidar",
+    "csv": "a CSV of rays",
+    "database": "a four-table database",
+    "store": "a DuckDB store of rays",
+    "parquet": "a Parquet table of rays",
+}
+
 #: Bytes of a file that are looked at to find out its kind.
 LOOKED_AT = 65_536
-
-_SCHEDULE = re.compile(r"\s*-?\d+[.,]\d{3}\s*-?\d+[.,]\d{3}\s*")
 
 
 class Reading(NamedTuple):
@@ -78,7 +90,7 @@ def read_all(place: str | Path, *, kind: Kind | None = None, options: Options | 
     if kind is not None and kind not in get_args(Kind):
         raise InputError(f"there is no kind of file {kind!r}: known are {', '.join(get_args(Kind))}")
     if "://" in str(place):
-        records = read_aas(str(place), options)
+        records = _said(read_aas(str(place), options), "database", kind)
         return Reading((records,), records.losses)
     path = Path(place)
     if path.is_dir():
@@ -86,9 +98,9 @@ def read_all(place: str | Path, *, kind: Kind | None = None, options: Options | 
     if not path.is_file():
         raise InputError(f"{path}: there is no such file or folder")
     found = kind or detect(path)
-    if found in (None, "companion"):
-        raise InputError(f"{path}: {_unknown(found)}")
-    records = _READERS[found](path, options)
+    if found is None or found == "companion":
+        raise InputError(f"{path}: {_unknown(path)}")
+    records = _said(_read_file(path, found, options), found, kind)
     return Reading((records,), records.losses)
 
 
@@ -106,7 +118,7 @@ def detect(path: Path) -> Kind | Literal["companion"] | None:
     InputError
         If the file is empty or cannot be opened.
     """
-    raw = read_bytes(path)[:LOOKED_AT] if path.suffix == ".gz" else _start(path)
+    raw = _start(path)
     if raw[:3] == b"CDF" or raw[:8] == b"\x89HDF\r\n\x1a\n":
         return "cfradial"
     if raw[:15] == b"SQLite format 3":
@@ -119,6 +131,9 @@ def detect(path: Path) -> Kind | Literal["companion"] | None:
 
 
 def _start(path: Path) -> bytes:
+    """The first bytes of a file, unpacked if need be."""
+    if path.suffix == ".gz":
+        return read_bytes(path)[:LOOKED_AT]
     try:
         with path.open("rb") as file:
             raw = file.read(LOOKED_AT)
@@ -128,7 +143,7 @@ def _start(path: Path) -> bytes:
 
 
 def _detect_text(lines: list[str]) -> Kind | Literal["companion"] | None:
-    lines = [line for line in lines if line.strip()]
+    lines = _written(lines)
     if not lines:
         return None
     head = "\n".join(lines[:20]).lower()
@@ -136,16 +151,19 @@ def _detect_text(lines: list[str]) -> Kind | Literal["companion"] | None:
         return "hpl"
     first = lines[0]
     names = {cell.strip().strip('"') for cell in re.split("[,;\t]", first)}
-    if {"LOSindex", "RWS"} <= names:
+    if {"LOSindex", "RWS"} <= {spelled(name) for name in names}:
         return "nacelle"
-    if all(_SCHEDULE.fullmatch(line) for line in lines[:5]):
-        return "companion"
     if any(_is_wind(line) for line in lines[:5]):
         return "windscanner"
-    fields = first.split(";")
-    if len(fields) in (4, 10, 11) and fields[0].strip().isdigit():
-        return "companion"
+    other = foreign(lines)
+    if other is not None:
+        return "companion" if other.rank == "companion" else None
     return "csv" if len(names) > 1 and not any(_is_number(name) for name in names) else None
+
+
+def _written(lines: list[str]) -> list[str]:
+    """The lines that are not blank."""
+    return [line for line in lines if line.strip()]
 
 
 def _is_wind(line: str) -> bool:
@@ -176,9 +194,9 @@ def _folder(folder: Path, kind: Kind | None, options: Options) -> Reading:
             if found == "companion" or (kind is not None and found is not None and found != kind):
                 continue
             if found is None:
-                losses.append(Loss(path.name, _unknown(found)))
+                losses.append(Loss(path.name, _unknown(path)))
                 continue
-            tables.append(_READERS[found](path, options))
+            tables.append(_said(_read_file(path, found, options), found, kind))
         except UnavailableError:
             raise
         except InputError as error:
@@ -196,13 +214,31 @@ def _folder(folder: Path, kind: Kind | None, options: Options) -> Reading:
     return Reading(joined, merged_losses([*losses, *(loss for table in joined for loss in table.losses)]))
 
 
-def _unknown(found: str | None) -> str:
-    if found == "companion":
-        return (
-            "belongs to another file and holds no rays: name the wind file, or the measurement that it was "
-            "made for"
-        )
-    return f"is of no kind that is known: give its kind ({', '.join(get_args(Kind))})"
+def _read_file(path: Path, found: str, options: Options) -> Records:
+    """Rays of a file; an error names it."""
+    try:
+        return _READERS[found](path, options)
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from error
+
+
+def _unknown(path: Path) -> str:
+    """What a file is that cannot be read, and what to do."""
+    other = foreign(_written(split_lines(decode(_start(path)))))
+    if other is not None:
+        return f"holds no rays: it is {other.text}"
+    return (
+        f"is of no kind that is known: give its kind ({', '.join(get_args(Kind))}), and for a CSV its columns"
+    )
+
+
+def _said(records: Records, found: str, asked: Kind | None) -> Records:
+    """Records that say what their file was taken for."""
+    how = "recognised as" if asked is None else "read, as asked, as"
+    note = f"{how} {LABELS[found]}" + (" (`kind` says otherwise)" if asked is None else "")
+    return replace(records, notes=(note, *records.notes))
 
 
 def _store(path: Path, options: Options) -> Records:

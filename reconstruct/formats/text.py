@@ -1,7 +1,10 @@
 """Text files as they come: encodings, truncated lines, broken numbers, and the times of three epochs."""
 
+import csv
 import gzip
 import io
+import math
+import zlib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -47,7 +50,7 @@ def read_bytes(path: Path) -> bytes:
         raw = path.read_bytes()
         if raw[:2] == b"\x1f\x8b":
             raw = gzip.decompress(raw)
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read ({error})") from error
     if not raw.strip(b"\x00 \t\r\n\xef\xbb\xbf"):
         raise InputError(f"{path}: the file is empty")
@@ -69,6 +72,20 @@ def decode(raw: bytes) -> str:
     except UnicodeDecodeError:
         text = raw.decode("cp1252", errors="replace")
     return text.replace("\x00", "")
+
+
+def plain_bytes(raw: bytes) -> bytes:
+    """The same text one byte a character as far as it is ASCII: without a byte order mark, NUL bytes, or
+    UTF-16.
+
+    Examples
+    --------
+    >>> plain_bytes("1 2".encode("utf-16")), plain_bytes("1 2".encode("utf-8-sig") + bytes(3))
+    (b'1 2', b'1 2')
+    """
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return decode(raw).encode("utf-8")
+    return raw.removeprefix(b"\xef\xbb\xbf").replace(b"\x00", b"")
 
 
 def lines_of(path: Path) -> list[str]:
@@ -163,16 +180,21 @@ def _numbers(rows: list[str], numbers: list[int], where: str, separator: str) ->
 
 
 def _parsed(rows: list[str], separator: str) -> FloatArray:
-    frame = pd.read_csv(io.StringIO("\n".join(rows)), sep=separator, header=None, dtype=float, engine="c")
-    return frame.to_numpy(dtype=float)
+    text = io.StringIO("\n".join(rows))
+    frame = pd.read_csv(text, sep=separator, header=None, dtype=float, engine="c", quoting=csv.QUOTE_NONE)
+    values = frame.to_numpy(dtype=float)
+    if np.isinf(values).any():
+        raise ValueError("a number without end")
+    return values
 
 
 def _numbers_of(row: str, separator: str) -> list[float] | None:
     """The numbers of one line; None if a field is no number."""
     try:
-        return [float(field or "nan") for field in row.split(separator)]
+        numbers = [float(field or "nan") for field in row.split(separator)]
     except ValueError:
         return None
+    return None if "_" in row or any(map(math.isinf, numbers)) else numbers
 
 
 def utc_from_unix(seconds: ArrayLike) -> TimeArray:

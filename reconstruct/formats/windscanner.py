@@ -8,41 +8,27 @@ degrees in wind direction. The middle comes from the scanner file, or is estimat
 down-sweeps.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TypeVar
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import InputError
-from reconstruct.formats.gate_union import GateBlock, common_gates
-from reconstruct.formats.head_positions import RayPositions, ray_positions, read_attitude, read_positions
+from reconstruct.formats.head_positions import RayPositions, ray_positions, read_positions
 from reconstruct.formats.options import Options
 from reconstruct.formats.over_the_top import folded
-from reconstruct.formats.text import Table, lines_of, number_tables, seconds_delta, utc_from_labview
+from reconstruct.formats.system_log import read_system
+from reconstruct.formats.text import seconds_delta, utc_from_labview
+from reconstruct.formats.wind_lines import WindLines, read_wind_lines
 from reconstruct.losses import Loss, merged_losses
 from reconstruct.records import Records
 from reconstruct.sweep_ids import sweep_ids
 from reconstruct.sweep_lag import estimate_lead, evened, sweep_rate, without_lead
 
-#: Header fields of one ray; units without scan_id and los_id write the last six.
-LONG_HEADER, SHORT_HEADER = 8, 6
-
-#: Numbers of one gate: range, radial speed, CNR, dispersion.
-GATE_NUMBERS = 4
-
-#: Seconds since 1904 of any lidar campaign lie above this (1967-05), below it is no time.
-EARLIEST_S = 2.0e9
-
-#: They lie below this (2126).
-LATEST_S = 7.0e9
-
-
-class _Wind(NamedTuple):
-    header: FloatArray  # (ray, 8)
-    block: GateBlock
-    line: IntArray  # (ray,)
+T = TypeVar("T")
 
 
 def read_windscanner(path: Path, options: Options | None = None) -> Records:
@@ -68,20 +54,8 @@ def read_windscanner(path: Path, options: Options | None = None) -> Records:
         If the file holds no ray, or the azimuths asked for cannot be had.
     """
     options = options or Options()
-    tables, losses = number_tables(lines_of(path), path.name)
-    split = [_split(table, path, losses) for table in tables]
-    winds = [wind for wind in split if wind is not None and len(wind.line)]
-    if not winds:
-        raise InputError(
-            f"{path}: no line is a ray: {SHORT_HEADER} or {LONG_HEADER} header fields and {GATE_NUMBERS} "
-            "numbers for each "
-            "gate are needed, separated by ';'"
-        )
-    header = np.concatenate([wind.header for wind in winds])
-    range_m, gates = common_gates([wind.block for wind in winds])
-    order = np.argsort(header[:, 4] + header[:, 5], kind="stable")
-    records = _stored(path, header[order], range_m, [values[order] for values in gates], options)
-    records = _pointed(path, header[order], replace(records, losses=tuple(losses)), options)
+    lines = read_wind_lines(path)
+    records = _pointed(path, lines.header, _stored(path, lines, options), options)
     return replace(records, losses=merged_losses(records.losses)).mounted(options.mounting)
 
 
@@ -92,87 +66,52 @@ def companion(path: Path, kind: str) -> Path | None:
     return beside if beside is not None and beside.is_file() else None
 
 
-def _split(table: Table, path: Path, losses: list[Loss]) -> _Wind | None:
-    """Header and gates of lines of one width; None, with the loss, if they are no rays."""
-    width = table.values.shape[1]
-    for size in (LONG_HEADER, SHORT_HEADER):
-        if (
-            width <= size
-            or (width - size) % GATE_NUMBERS
-            or np.mean(_is_time(table.values[:, size - 4])) < 0.5
-        ):
-            continue
-        header = table.values[:, :size]
-        if size == SHORT_HEADER:
-            header = np.column_stack([np.zeros(len(header)), np.arange(len(header)), header])
-        gates = table.values[:, size:].reshape(len(header), -1, GATE_NUMBERS)
-        whole = (
-            _is_time(header[:, 4])
-            & _is_time(header[:, 5])
-            & np.all(np.isfinite(header), axis=1)
-            & np.all(np.isfinite(gates[..., 0]), axis=1)
-        )
-        if not np.all(whole):
-            text = "an empty field, or a time that is none, in the header or among the ranges"
-            losses.append(Loss(path.name, text, int(table.line[~whole][0]), int(np.sum(~whole))))
-        return _Wind(header[whole], GateBlock(gates[whole, :, 0], gates[whole, :, 1:]), table.line[whole])
-    text = f"{width} fields are no ray: 6 or 8 header fields and 4 numbers for each gate are needed"
-    losses.append(Loss(path.name, text, int(table.line[0]), len(table.line)))
-    return None
-
-
-def _is_time(seconds: FloatArray) -> BoolArray:
-    """Whether numbers can be times of a campaign in seconds since 1904."""
-    return np.asarray((seconds > EARLIEST_S) & (seconds < LATEST_S))
-
-
-def _stored(
-    path: Path, header: FloatArray, range_m: FloatArray, gates: list[FloatArray], options: Options
-) -> Records:
+def _stored(path: Path, lines: WindLines, options: Options) -> Records:
     """Records with the angles as the wind file has them."""
+    header = lines.header
     start, stop = header[:, 4], header[:, 5]
     azimuth, elevation, note = folded(header[:, 6], header[:, 7])
-    time = utc_from_labview(start) + seconds_delta((stop - start) / 2 + options.clock_offset_s)
-    notes = ["times turned from seconds since 1904 to UTC at the middle of the ray", *note]
+    time = utc_from_labview((start + stop) / 2) + seconds_delta(options.clock_offset_s)
+    notes = ["times turned from seconds since 1904 to UTC at the middle of the ray", *note, *lines.notes]
     if options.clock_offset_s:
         notes.append(f"clock moved by {options.clock_offset_s:g} s")
-    speed, cnr, width = gates
+    speed, cnr, width = lines.gates
     return Records(
         time_utc=time,
-        duration_s=np.maximum(stop - start, 0.0),
+        duration_s=stop - start,
         azimuth_deg=azimuth,
         elevation_deg=elevation,
         scan_id=header[:, 0].astype(np.intp),
         sweep_id=sweep_ids(azimuth, elevation),
-        range_m=range_m,
+        range_m=lines.range_m,
         radial_speed_mps=speed,
         cnr_db=cnr,
         spectral_width_mps=width,
         instrument=options.instrument or _unit(path),
         notes=tuple(notes),
+        losses=lines.losses,
     )
 
 
 def _unit(path: Path) -> str:
-    """Name of the unit: what stands before the first underscore of the file's name, or its folder."""
+    """Name of the unit: what stands before the first underscore of the file's name unless it is a date
+    (`20161110233000_wind.txt`), or its folder.
+    """
     head, found, _ = path.name.partition("_")
-    return head if found else path.parent.name
+    return head if found and not head.isdigit() else path.parent.name
 
 
 def _pointed(path: Path, header: FloatArray, records: Records, options: Options) -> Records:
     """Records with the angles of the middle of the ray, and with the attitude, where that can be had."""
-    system = companion(path, "system")
-    if system is not None:
-        attitude, lost = read_attitude(system, header[:, 2], header[:, 3])
-        records = replace(records, losses=(*records.losses, *lost), **attitude)
+    records = _with_system(records, companion(path, "system"), header)
     if options.azimuth == "stored":
         return _noted(records, "azimuths as stored, which may lead the middle of the ray by up to a step")
     scanner = companion(path, "scanner")
     if options.azimuth in ("auto", "scanner") and scanner is not None:
-        log, lost = read_positions(scanner)
-        found = ray_positions(log, header[:, 2], header[:, 3])
+        log, lost = _if_readable(read_positions, scanner)
         records = replace(records, losses=(*records.losses, *lost))
-        if np.any(found.covered):
+        found = ray_positions(log, header[:, 2], header[:, 3]) if log is not None else None
+        if found is not None and np.any(found.covered):
             return _from_positions(records, found)
     if options.azimuth == "scanner":
         raise InputError(
@@ -181,6 +120,26 @@ def _pointed(path: Path, header: FloatArray, records: Records, options: Options)
             "azimuths 'estimate' or 'stored'"
         )
     return _from_estimate(records, options)
+
+
+def _with_system(records: Records, system: Path | None, header: FloatArray) -> Records:
+    """Records with the logged attitude, and with what the GPS says of the clock."""
+    if system is None:
+        return records
+    log, lost = _if_readable(read_system, system)
+    records = replace(records, losses=(*records.losses, *lost))
+    if log is None:
+        return records
+    attitude = log.attitude_at(header[:, 2], header[:, 3])
+    return _noted(replace(records, **attitude), *log.clock_notes(header[:, 2:6]))  # type: ignore[arg-type]
+
+
+def _if_readable(reader: Callable[[Path], tuple[T, list[Loss]]], path: Path) -> tuple[T | None, list[Loss]]:
+    """A file beside the wind file, or the loss of it: the wind file is read without."""
+    try:
+        return reader(path)
+    except InputError as error:
+        return None, [Loss(path.name, str(error).removeprefix(f"{path}: "))]
 
 
 def _from_positions(records: Records, found: RayPositions) -> Records:
@@ -224,5 +183,5 @@ def _from_estimate(records: Records, options: Options) -> Records:
     return _noted(without_lead(even, found.lead_deg), note)
 
 
-def _noted(records: Records, note: str) -> Records:
-    return replace(records, notes=(*records.notes, note))
+def _noted(records: Records, *notes: str) -> Records:
+    return replace(records, notes=(*records.notes, *notes))

@@ -19,6 +19,7 @@ from reconstruct.uncertainty import ErrorSources
 from reconstruct.wind import WindState
 
 SCANS, RAYS, GATES = 50_000, 30, 41
+MAP_LIMIT_S = 1.4 / 15  # fifteen times faster than an existing tool, which takes 1.4 s and 1.15 GB
 
 
 def best_s(work: Callable[[], object], repeats: int = 3) -> float:
@@ -53,19 +54,21 @@ def bench_week() -> None:
 
 def bench_map() -> None:
     """Linear tier for two lidars on a map of 1001 x 1001 targets."""
-    angle = np.random.default_rng(1).uniform(0, 2 * np.pi, 1_000_000)
+    angle = np.random.default_rng(1).uniform(0, 2 * np.pi, 1001 * 1001)
     sine_s = best_s(lambda: np.sin(angle), 5)
+    root_s = best_s(lambda: np.sqrt(angle), 5)
     heads = np.array([[0.0, 0.0, 0.0], [1000.0, 1000.0, 0.0]])
     east, north = np.linspace(-3000, 3000, 1001)[:, None], np.linspace(-3000, 3000, 1001)
     wind = WindState(speed_mps=10.0, from_deg=0.0, shear_exponent=0.2, height_m=100.0)
     errors = ErrorSources(radial_speed_mps=0.1, azimuth_deg=0.1, elevation_deg=0.1, range_m=1.0)
     map_s = best_s(lambda: pair_map(heads, east, north, 100.0, wind, errors), 5)
     print(
-        f"map of 1001 x 1001: {map_s:.3f} s, {map_s / sine_s:.0f} x numpy.sin of 1e6 ({sine_s * 1e3:.1f} ms)"
+        f"map of 1001 x 1001: {map_s:.3f} s (limit {MAP_LIMIT_S:.3f}), {map_s / sine_s:.1f} x numpy.sin "
+        f"({sine_s * 1e3:.1f} ms), {map_s / root_s:.0f} x numpy.sqrt ({root_s * 1e3:.1f} ms) of as many numbers"
     )
     tracemalloc.start()
     pair_map(heads, east, north, 100.0, wind, errors)
-    print(f"memory: {tracemalloc.get_traced_memory()[1] / 1e6:.0f} MB")
+    print(f"memory (limit 200 MB): {tracemalloc.get_traced_memory()[1] / 1e6:.0f} MB")
     tracemalloc.stop()
 
 

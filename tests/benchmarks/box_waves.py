@@ -1,11 +1,13 @@
-"""What a box of some size does to the variances that the judge finds: the exact sum over the waves of the box,
-without drawing any. Prints the table of docs/decisions/judge-field.md.
+"""What box and single waves of the judge together leave of the variances that a scan and ten minutes have: exact
+sums over the waves of the box, and integrals over the spectrum for the rest, without drawing any amplitude.
+Prints the table of docs/decisions/judge-field.md.
 
 Run from the root of the project: python tests/benchmarks/box_waves.py
 """
 
 import importlib.util
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,48 +17,82 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from geometry.arrays import FloatArray  # noqa: E402
-from reconstruct.field import MARGIN_LENGTHS, subgrid_covariance  # noqa: E402
+from reconstruct.field import MARGIN_LENGTHS  # noqa: E402
 from reconstruct.flight import beams, carried_mps, reach_m, to_wind_frame  # noqa: E402
 from reconstruct.rays import Rays  # noqa: E402
 from reconstruct.retrieval import gain, rows  # noqa: E402
 from reconstruct.spectra import Turbulence, spectral_tensor  # noqa: E402
 from reconstruct.ten_minute import predict_ten_minute  # noqa: E402
+from reconstruct.turbulent import turbulence_covariance  # noqa: E402
+from reconstruct.waves import long_share  # noqa: E402
 from reconstruct.wind import WindState  # noqa: E402
 
 PERIOD_S = 600.0
-FINEST_PER_M = (0.012, 0.05, 0.05)  # along the wind, to the left, up: what ten minutes and a wide scan leave
-FINEST_LENGTHS = 8.0  # wavenumber times L: what one scan leaves in the mean along its axis
-REPAIRED = 2.0  # wavenumber times L under which the field gets back the variance that the box lost
+OF_PERIOD = (2.0, 8.0, 8.0)  # wavenumber times L up to which the box is summed, along the wind, left, up
+OF_SCAN = (14.0, 14.0, 14.0)
+LONGEST_M, SHORTEST_M = 6e5, 4.0  # of the integrals over the spectrum, 2 pi over the wavenumber
+DRAWN = 200_000  # waves of those integrals
+CHUNK = 20_000
+
+Seen = Callable[[FloatArray], FloatArray]  # (wave, 3) by which a wave's three components count
 
 
-class Scatter(NamedTuple):
-    """Standard deviations of the mean direction over ten minutes [degrees], to first order."""
+class Share(NamedTuple):
+    """A variance by box and waves over that by the whole spectrum, and the latter [(m/s)² for 1 m/s]."""
 
-    lidar: float
-    target: float
-    difference: float
+    share: float
+    whole: float
 
 
-def waves(size_m: FloatArray, finest_per_m: tuple[float, float, float]) -> FloatArray:
-    """Wave vectors (3, wave) of a periodic box [rad/m], both signs."""
+def box_waves(size_m: FloatArray, finest_per_m: FloatArray) -> Iterator[FloatArray]:
+    """Wave vectors (3, wave) of a periodic box [rad/m], both signs, some at a time."""
     steps = 2 * np.pi / size_m
-    axes = [
+    x, y, z = (
         step * np.arange(-int(end / step), int(end / step) + 1)
         for end, step in zip(finest_per_m, steps, strict=True)
-    ]
-    every = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)
-    return every[:, np.any(every != 0, axis=0)]
+    )
+    rows_at_once = max(1, CHUNK // (len(y) * len(z)))
+    for start in range(0, len(x), rows_at_once):
+        every = np.stack(np.meshgrid(x[start : start + rows_at_once], y, z, indexing="ij")).reshape(3, -1)
+        yield every[:, np.any(every != 0, axis=0)]
 
 
-def repair(air: Turbulence, size_m: FloatArray) -> float:
-    """Factor on the variance of the long waves by which the field makes up for its box."""
-    limit = REPAIRED / air.length_m
-    inside = waves(size_m, (6 * limit,) * 3)
-    number = np.linalg.norm(inside, axis=0)
-    inside, number = inside[:, number < 6 * limit], number[number < 6 * limit]
-    power = np.sum(spectral_tensor(air, inside)[:3], axis=0) * np.prod(2 * np.pi / size_m)
-    wanted = 3 - float(np.trace(subgrid_covariance(air, 6 * limit)))
-    return float(1 + (wanted - np.sum(power)) / np.sum(power[number < limit]))
+def drawn_waves(rng: np.random.Generator) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Wave vectors (3, wave) of all lengths [rad/m], crowding across the wind, and the space that each stands for."""
+    low, high = np.log(2 * np.pi / LONGEST_M), np.log(2 * np.pi / SHORTEST_M)
+    for start in range(0, DRAWN, CHUNK):
+        strata = (start + np.arange(CHUNK) + rng.uniform(size=CHUNK)) / DRAWN
+        wavenumber = np.exp(low + (high - low) * strata)
+        root, turn = rng.uniform(-1, 1, CHUNK), rng.uniform(0, 2 * np.pi, CHUNK)
+        level = np.sqrt(1 - root**6)
+        direction = np.stack([root**3, level * np.cos(turn), level * np.sin(turn)])
+        yield wavenumber * direction, 12 * np.pi * root**2 * wavenumber**3 * ((high - low) / DRAWN)
+
+
+def power(air: Turbulence, wave: FloatArray, seen: FloatArray) -> FloatArray:
+    """(wave,) density that waves give what is seen of them."""
+    c11, c22, c33, c12, c13, c23 = spectral_tensor(air, wave)
+    tensor = np.array([[c11, c12, c13], [c12, c22, c23], [c13, c23, c33]])
+    return np.asarray(np.einsum("wk,klw,wl->w", seen, tensor, seen.conj(), optimize=True).real)
+
+
+def kept(air: Turbulence, size_m: FloatArray, lengths: tuple[float, float, float], seen: Seen) -> Share:
+    """Share of a variance that box and single waves leave."""
+    finest = np.array(lengths) / air.length_m
+    inside = 0.0
+    for wave in box_waves(size_m, finest):
+        boxed = 1 - long_share(air, np.linalg.norm(wave, axis=0))
+        inside += float(np.sum(boxed * power(air, wave, seen(wave)))) * float(np.prod(2 * np.pi / size_m))
+    edge = (np.floor(finest * size_m / (2 * np.pi)) + 0.5) * 2 * np.pi / size_m  # of the outermost cells
+    whole = outside = 0.0
+    for wave, space in drawn_waves(np.random.default_rng(1)):
+        each = space * power(air, wave, seen(wave))
+        whole += float(np.sum(each))
+        summed = np.all(np.abs(wave) < edge[:, None], axis=0)
+        outside += float(
+            np.sum(each * np.where(summed, long_share(air, np.linalg.norm(wave, axis=0)), 1.0))
+        )
+    return Share((inside + outside) / whole, whole)
 
 
 def seen_of_scan(rays: Rays, wind: WindState, wave: FloatArray, fit: FloatArray, *, odd: bool) -> FloatArray:
@@ -65,7 +101,7 @@ def seen_of_scan(rays: Rays, wind: WindState, wave: FloatArray, fit: FloatArray,
     beam = beams(rays.azimuth_deg, rays.elevation_deg, wind.from_deg)
     centre = to_wind_frame(rays.centre_m, wind.from_deg)
     out = np.zeros((wave.shape[1], 3), dtype=complex)
-    for ray, time_s in enumerate(rays.times_s(2)[int(odd)]):
+    for ray, time_s in enumerate(rays.times_s(2)[int(odd)] - rays.period_s * odd):
         swept = np.radians(rays.swept_azimuth_deg[ray]) * (-1 if odd else 1) * rays.range_m[ray]
         way = swept * np.array([beam[ray, 1], -beam[ray, 0], 0.0]) - rays.duration_s[ray] * velocity
         seen = np.exp(1j * (centre[ray] - velocity * time_s) @ wave) * np.sinc(way @ wave / (2 * np.pi))
@@ -73,55 +109,38 @@ def seen_of_scan(rays: Rays, wind: WindState, wave: FloatArray, fit: FloatArray,
     return out
 
 
-def responses(rays: Rays, wind: WindState, wave: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean wind to the left (wave, 3) that a wave's three components give the lidar and the target."""
-    angle = np.radians(wind.from_deg)
-    left = np.array([np.cos(angle), -np.sin(angle)]) @ gain(rows(rays.azimuth_deg, rays.elevation_deg))
+def component(rays: Rays, toward_deg: float) -> FloatArray:
+    """(ray,) row of the fit that gives the wind toward a direction."""
+    angle = np.radians(toward_deg)
+    return np.asarray(
+        np.array([np.sin(angle), np.cos(angle)]) @ gain(rows(rays.azimuth_deg, rays.elevation_deg))
+    )
+
+
+def seen_in_ten_minutes(rays: Rays, wind: WindState, wave: FloatArray) -> FloatArray:
+    """Mean wind to the left (wave, 3) that a wave's three components give the lidar, less that of the target."""
+    left = component(rays, wind.from_deg + 90.0)
     scans, turning = int(PERIOD_S / rays.period_s), carried_mps(wind) @ wave
     lidar = np.zeros((wave.shape[1], 3), dtype=complex)
     for odd in (False, True):
-        starts = rays.period_s * np.arange(0, scans - odd, 2)
+        starts = rays.period_s * np.arange(int(odd), scans, 2)
         repeated = np.exp(-1j * np.outer(turning, starts)).sum(axis=1) / scans
         lidar += repeated[:, None] * seen_of_scan(rays, wind, wave, left, odd=odd)
     middle = np.exp(-0.5j * turning * PERIOD_S) * np.sinc(turning * PERIOD_S / (2 * np.pi))
-    return lidar, middle[:, None] * np.array([0.0, 1.0, 0.0])
+    return np.asarray(lidar - middle[:, None] * np.array([0.0, 1.0, 0.0]))
 
 
-def power_of(air: Turbulence, wave: FloatArray, size_m: FloatArray) -> FloatArray:
-    """(3, 3, wave) covariance that each wave of the box has, long ones repaired."""
-    c11, c22, c33, c12, c13, c23 = spectral_tensor(air, wave)
-    tensor = np.array([[c11, c12, c13], [c12, c22, c23], [c13, c23, c33]])
-    long_waves = np.linalg.norm(wave, axis=0) < REPAIRED / air.length_m
-    return tensor * np.prod(2 * np.pi / size_m) * np.where(long_waves, repair(air, size_m), 1.0)
-
-
-def carried(seen: FloatArray, power: FloatArray) -> float:
-    """Variance that the waves give what is seen of them."""
-    return float(np.einsum("wk,klw,wl->", seen, power, seen.conj(), optimize=True).real)
-
-
-def scatter(rays: Rays, wind: WindState, air: Turbulence, margin_lengths: FloatArray) -> Scatter:
-    """Scatter of a back-and-forth scan and of the target in a box that is (3,) lengths larger than what they
-    meet.
-    """
+def along_axis(rays: Rays, wind: WindState, air: Turbulence, margin_lengths: FloatArray) -> Share:
+    """Variance of the first scan along a sector's axis."""
     size = reach_m(rays, wind, PERIOD_S) + margin_lengths * air.length_m
-    wave = waves(size, FINEST_PER_M)
-    power = power_of(air, wave, size)
-    lidar, target = responses(rays, wind, wave)
-    degrees = np.degrees(air.intensity)  # of a standard deviation across the mean wind
-    found = [degrees * np.sqrt(carried(seen, power)) for seen in (lidar, target, lidar - target)]
-    return Scatter(*(float(value) for value in found))
+    fit = component(rays, float(np.mean(rays.azimuth_deg)))
+    return kept(air, size, OF_SCAN, lambda wave: seen_of_scan(rays, wind, wave, fit, odd=False))
 
 
-def along_axis(rays: Rays, wind: WindState, air: Turbulence, margin_lengths: FloatArray) -> float:
-    """Variance of the first scan along a sector's axis, of waves down to `FINEST_LENGTHS` [m2/s2]."""
+def ten_minutes(rays: Rays, wind: WindState, air: Turbulence, margin_lengths: FloatArray) -> Share:
+    """Variance of the mean wind across in ten minutes, scan less target."""
     size = reach_m(rays, wind, PERIOD_S) + margin_lengths * air.length_m
-    wave = waves(size, (FINEST_LENGTHS / air.length_m,) * 3)
-    middle = np.radians(np.mean(rays.azimuth_deg))
-    axis = np.array([np.sin(middle), np.cos(middle)])
-    fit = axis @ gain(rows(rays.azimuth_deg, rays.elevation_deg))
-    found = carried(seen_of_scan(rays, wind, wave, fit, odd=False), power_of(air, wave, size))
-    return found * air.std_mps(wind.speed_mps) ** 2
+    return kept(air, size, OF_PERIOD, lambda wave: seen_in_ten_minutes(rays, wind, wave))
 
 
 def hovsore() -> Rays:
@@ -135,20 +154,28 @@ def hovsore() -> Rays:
 
 def main() -> None:
     """Print the table."""
-    rays, air = hovsore(), Turbulence(0.09, 170.0)
+    rays = hovsore()
+    axis = np.radians(np.mean(rays.azimuth_deg))
+    toward = np.array([np.sin(axis), np.cos(axis)])
     print(
-        "| wind | margin | one scan along its axis, over 14 L | lidar ° | target ° | difference ° | closed form ° |"
+        "| spectrum | wind | margin | along the axis: kept | spectrum (m/s)² | tier | 10': kept | spectrum ° | tier ° |"
     )
-    print("| --- | --- | --- | --- | --- | --- | --- |")
-    for name, from_deg in (("along", 192.0), ("45° off", 237.0), ("across", 282.0)):
-        wind = WindState(8.0, from_deg)
-        closed = float(predict_ten_minute(rays, wind, air).direction_std_deg)
-        large = along_axis(rays, wind, air, np.full(3, 14.0))
-        for margin in (np.full(3, 5.0), np.full(3, 7.0), MARGIN_LENGTHS, np.full(3, 14.0)):
-            found = scatter(rays, wind, air, margin)
-            size = " x ".join(f"{length:g}" for length in np.unique(margin))
-            numbers = " | ".join(f"{value:.3f}" for value in (*found, closed))
-            print(f"| {name} | {size} L | {along_axis(rays, wind, air, margin) / large:.3f} | {numbers} |")
+    print("| --- " * 9 + "|")
+    for air in (Turbulence(0.09, 170.0), Turbulence(0.09, 170.0, "mann")):
+        for name, from_deg in (("along", 192.0), ("45° off", 237.0), ("across", 282.0)):
+            wind = WindState(8.0, from_deg)
+            variance = float(toward @ turbulence_covariance(rays, wind, air) @ toward)
+            direction = float(predict_ten_minute(rays, wind, air).direction_std_deg)
+            for lengths in (2.0, float(MARGIN_LENGTHS[0]), 6.0):
+                margin = np.full(3, lengths)
+                one, ten = (measure(rays, wind, air, margin) for measure in (along_axis, ten_minutes))
+                size = f"{one.whole * air.std_mps(8.0) ** 2:.4f} | {variance:.4f}"
+                degrees = np.degrees(air.intensity * np.sqrt(ten.whole))
+                print(
+                    f"| {air.model} | {name} | {lengths:g} L | {one.share:.3f} | {size} | {ten.share:.3f} "
+                    f"| {degrees:.3f} | {direction:.3f} |",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -18,9 +18,10 @@ sys.path.insert(0, str(ROOT))
 from geometry.beams import unit_vector  # noqa: E402
 from geometry.gates import Probe  # noqa: E402
 from reconstruct.monte_carlo import Scene, Settings, simulate_scenes  # noqa: E402
+from reconstruct.periods import TEN_MINUTES_S  # noqa: E402
 from reconstruct.rays import Rays  # noqa: E402
 from reconstruct.spectra import Turbulence  # noqa: E402
-from reconstruct.ten_minute import AVERAGING_S, predict_ten_minute  # noqa: E402
+from reconstruct.ten_minute import predict_ten_minute  # noqa: E402
 from reconstruct.turbulent import predict_turbulent  # noqa: E402
 from reconstruct.uncertainty import ErrorSources  # noqa: E402
 from reconstruct.verdict import judge  # noqa: E402
@@ -181,7 +182,7 @@ def compare(
     fields: int,
     seed: int,
     cells_per_length: float | None = None,
-    averaging_s: float = AVERAGING_S,
+    averaging_s: float = TEN_MINUTES_S,
 ) -> list[Row]:
     """Rows of all scenes of one air: one flight of ten minutes through each field."""
     winds = {name: WindState(air.speed_mps, from_deg) for name, (_, from_deg) in air.scenes.items()}

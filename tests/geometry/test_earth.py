@@ -77,6 +77,13 @@ def test_rotation_rows_are_the_ellipsoids_own_directions(longitude: float, latit
     assert rotation[1, 2] >= 0.0
 
 
+def test_published_example_of_the_topocentric_conversion() -> None:
+    """EPSG Guidance Note 7-2, example of method 9836: seen from 55 N, 5 E, to the millimetre it is printed with."""
+    origin, point = [3652755.3058, 319574.6799, 5201547.3536], [3771793.968, 140253.342, 5124304.349]
+    seen = ecef_to_enu_rotation(5.0, 55.0) @ (np.array(point) - origin)
+    np.testing.assert_allclose(seen, [-189013.869, -128642.040, -4220.171], rtol=0.0, atol=5e-4)
+
+
 def test_rotations_keep_leading_axes() -> None:
     """One matrix for each position."""
     assert ecef_to_enu_rotation(np.zeros((4, 1)), np.zeros(3)).shape == (4, 3, 3, 3)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from geometry.errors import InputError
 from geometry.segments import passing
 from geometry.solids import Boxes, Cylinders, Spheres
-from geometry.terrain import HeightRaster, beam_height_m, terrain_sight
+from geometry.terrain import HeightRaster
+from geometry.terrain_sight import beam_height_m, nearest_pass, terrain_sight
 from geometry.viewshed import horizon, viewshed
 
 EARTH_M = 6_371_008.8

@@ -13,15 +13,16 @@ from geometry.angles import difference_deg
 from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
-from planner.cnr_fit import Mapped, drifts, fit_head, site_keys
+from planner.cnr_fit import Drift, Mapped, drifts, fit_head, site_keys
 from planner.cnr_map import choose_targets, plan_map
+from planner.cnr_simulate import rehearse
+from planner.cnr_window import staggered
 from planner.figures.cnr_map import cnr_map_figure
 from planner.files.yaml_edit import write_lidar
 from planner.files.yaml_site import load_site, parse_site
 from planner.hard_targets import sought
 from planner.places import Places
 from reconstruct.cnr_map import CnrMap
-from reconstruct.cnr_simulation import simulate_cnr_map
 from reconstruct.hard_target import find_target
 from reconstruct.record_tables import to_wide
 from reconstruct.records import Records
@@ -57,6 +58,11 @@ targets:
 """
 TIPS = ("tip N", "tip E", "tip S", "tip W")
 PLANTED = {"azimuth_offset_deg": 12.35, "pitch_deg": 0.03, "roll_deg": -0.03}
+OFF = {
+    "azimuth_offset_deg": 0.05,
+    "pitch_deg": 0.03,
+    "roll_deg": -0.03,
+}  # the same less what the site file says
 
 
 @pytest.fixture
@@ -71,46 +77,48 @@ def places() -> Places:
     return Places(parse_site(SITE))
 
 
-def planned_map(places: Places, target: str, true: Mounting, rng: np.random.Generator) -> CnrMap:
-    """What the planned scan measures with a head that stands like this; gates in the middle of the planned ones."""
-    lidar = places.site.lidar("L")
-    plan = plan_map(places, "L", target)
-    declared, position = sought(places.site, target)
-    middle = round(plan.expected.range_head_m)
-    place = places.frame.enu_m(lidar.position, np.add(position, rng.normal(0, declared.uncertainty_m, 3)))
-    return simulate_cnr_map(
-        *plan.windows[-1].rays,
-        np.arange(middle - GATES // 2, middle + GATES // 2 + 1.0),
-        target_m=place,
-        shape=declared.shape,
-        size_m=declared.size_m,
-        probe=PROBE,
-        rng=rng,
-        mounting=true,
-    )
-
-
 def planted(places: Places) -> Mounting:
     return replace(places.mounting(places.site.lidar("L")), **PLANTED)
 
 
-def maps_of(places: Places, seed: int, names=TIPS) -> list[tuple[str, CnrMap]]:
-    rng = np.random.default_rng(seed)
-    return [(name, planned_map(places, name, planted(places), rng)) for name in names]
+def maps_of(places: Places, seed: int, names=TIPS, **planted_too: float) -> list[tuple[str, CnrMap]]:
+    """What the planned scans measure with the head that is planted; gates in the middle of the planned ones."""
+    off = {**OFF, **planted_too}
+    done = rehearse(places, "L", names, rng=np.random.default_rng(seed), planted=off)
+    middles = [round(plan.expected.range_head_m) for plan in done.plans]
+    return [
+        (name, found.between_m(middle - GATES // 2, middle + GATES // 2))
+        for (name, found), middle in zip(done.maps, middles, strict=True)
+    ]
 
 
 def test_planted_offsets_come_back_within_a_hundredth_of_a_degree_and_inside_their_uncertainty(
     places: Places,
 ) -> None:
-    """0.05° of heading, 0.03° of pitch and roll, 1 m gates; 5 seeded runs of what 200 were tried of."""
+    """0.05° of heading, 0.03° of pitch and roll, 1 m gates, head and masts off their survey; 6 seeded runs.
+
+    200 runs of the Høvsøre rehearsal: `python -m tests.benchmarks.bench_cnr_offsets`.
+    """
     inside = []
-    for seed in range(5):
+    for seed in range(6):
         fit = fit_head(places, "L", maps_of(places, seed), probe=PROBE).fit
         for angle in fit.solved:
             error = getattr(fit.mounting, angle) - getattr(planted(places), angle)
             assert abs(error) < 0.01
             inside.append(abs(error) < 2 * fit.std_deg(angle))
-    assert np.mean(inside) >= 0.8
+    assert np.mean(inside) >= 0.8  # of 24: 95.4 % expected, less is under 0.5 % likely
+
+
+def test_a_staggered_map_is_met_at_every_phase_of_an_edge() -> None:
+    """Any 8 neighbouring rows have columns within 1/4 of a step of any place, and any 8 columns rows."""
+    azimuth, elevation = staggered(np.arange(30.0), np.arange(40.0), "rows")
+    place = np.stack([azimuth, elevation], axis=1).reshape(40, 30, 2)
+    place[1::2] = place[1::2, ::-1]
+    assert np.abs(place[..., 0] - np.arange(30.0)).max() <= 0.5
+    assert np.abs(place[..., 1] - np.arange(40.0)[:, None]).max() <= 0.5
+    for phases in (place[5:13, 0, 0] % 1.0, place[0, 5:13, 1] % 1.0):
+        ordered = np.sort(phases)
+        assert np.diff(np.append(ordered, ordered[0] + 1.0)).max() < 0.25
 
 
 def test_the_window_is_three_sigma_and_centred_on_where_the_head_must_point(places: Places) -> None:
@@ -119,8 +127,9 @@ def test_the_window_is_three_sigma_and_centred_on_where_the_head_must_point(plac
     head = places.mounting(places.site.lidar("L")).to_head(
         plan.expected.true.azimuth_deg, plan.expected.true.elevation_deg
     )
-    assert abs(float(np.mean([azimuth.min(), azimuth.max()])) - float(head[0])) < 1e-9
-    assert abs(float(np.mean([elevation.min(), elevation.max()])) - float(head[1])) < 1e-9
+    step = np.diff(plan.windows[-1].azimuth_deg[:2])[0]
+    assert abs(float(np.mean([azimuth.min(), azimuth.max()])) - float(head[0])) < step / 2
+    assert abs(float(np.mean([elevation.min(), elevation.max()])) - float(head[1])) < step / 2
     assert azimuth.max() - azimuth.min() > 6 * 0.05
     assert np.hypot(0.05, 0.02) < plan.expected.azimuth_std_deg < 0.06
 
@@ -180,25 +189,32 @@ def test_every_map_without_a_target_is_named(places: Places) -> None:
 
 
 def test_a_head_that_moved_between_two_tests_has_drifted(places: Places) -> None:
-    rng = np.random.default_rng(4)
-    first = maps_of(places, 3)
-    turned = replace(planted(places), azimuth_offset_deg=12.33)
-    again = [
-        ("tip S", planned_map(places, "tip S", turned, rng)),
-        ("tip W", planned_map(places, "tip W", planted(places), rng)),
-    ]
-    repeated = fit_head(places, "L", [*first, again[1]], probe=PROBE).drifts
-    assert [(item.target, item.maps) for item in repeated] == [("tip W", 2)]
-    assert abs(repeated[0].azimuth_deg) < 0.01
+    """Repeated maps of a head that stands: no drift. One turned by 0.02° in between: named, with its size, not fitted."""
+    names = (*TIPS, "tip W")
+    *first, again = maps_of(places, 3, names)
+    (still,) = fit_head(places, "L", [*first, again], probe=PROBE).drifts
+    assert (still.target, still.maps, still.is_significant) == ("tip W", 2, False)
+    assert still.chance > 0.05
+    turned = maps_of(places, 3, names, azimuth_offset_deg=0.03)
     pair = [
         Mapped(
             name, sought(places.site, name)[0], m, find_target(m, shape="tip", size_m=1.0, probe=PROBE), None
         )
-        for name, m in (first[2], again[0])
+        for name, m in (first[2], turned[2])
     ]
     (moved,) = drifts(pair)
     assert moved.is_significant
-    assert moved.azimuth_deg == pytest.approx(0.02, abs=0.006)
+    assert moved.chance < 1e-6
+    assert moved.azimuth_deg == pytest.approx(0.02, abs=0.004)
+    with pytest.raises(InputError, match="Between its first and last map tip N, tip E, tip S, tip W has moved"):
+        fit_head(places, "L", [*first, *turned[:4]], probe=PROBE)
+
+
+def test_drift_is_called_significant_as_often_as_it_says(places: Places) -> None:
+    """Three numbers without drift: 5 % of draws are called one."""
+    rng = np.random.default_rng(1)
+    called = [Drift("t", 2, *rng.normal(0, 1, 3), 1.0, 1.0, 1.0).is_significant for _ in range(2000)]
+    assert np.mean(called) == pytest.approx(0.05, abs=0.015)
 
 
 def test_offsets_go_into_the_site_file_and_leave_the_rest_as_it_is(site_file: Path) -> None:

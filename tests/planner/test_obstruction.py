@@ -123,7 +123,7 @@ def test_where_a_beam_meets_the_round_earth_by_brute_force() -> None:
         assert found == pytest.approx(met[0] if met.size else np.inf, abs=1.5 + 0.01 * found * (found < 1e9))
 
 
-def test_a_terrain_says_itself_where_the_ground_is(moor: Moor) -> None:
+def test_a_beam_into_the_level_ground_is_lost_where_it_meets_it(moor: Moor) -> None:
     scan = {"name": "a", "lidar": "A", "type": "stare", "accumulation_s": 0.5, "gates": None}
     head = {"azimuth_head_deg": 0, "elevation_head_deg": -5}
     gates = {"first_m": 500, "spacing_m": 10, "count": 1}
@@ -131,5 +131,3 @@ def test_a_terrain_says_itself_where_the_ground_is(moor: Moor) -> None:
     (met,) = moor(ground_height_m=0, scans=down, pairs=[]).obstructions
     assert (met.part, met.lost.tolist()) == ("ground", [True])
     assert met.range_m == pytest.approx(10 / np.sin(np.deg2rad(5)), abs=0.1)
-    hills = {"ground_height_m": None, "terrain": {"file": "hills.tif"}}
-    assert moor(**hills, scans=down, pairs=[]).obstructions == ()

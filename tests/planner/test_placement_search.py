@@ -152,7 +152,8 @@ def test_exchange_reaches_the_best_set_of_the_grid():
         for i, j in combinations(range(table.candidates), 2)
     ]
     starts = np.array(list(combinations(range(0, table.candidates, 5), 2)))
-    found = search.best_sets(table, [], starts, count=3, cost=np.zeros(table.candidates), **options)
+    tables = search.SetTables(table, (), starts, 3, np.zeros(table.candidates), 30.0, "worst")
+    found = search.best_sets(tables)
     assert found.value[0] <= min(every) * 1.01
 
 

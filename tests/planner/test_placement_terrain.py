@@ -9,6 +9,7 @@ from geometry.errors import InputError
 from geometry.terrain import HeightRaster
 from planner.files.raster import load_terrain, write_geotiff
 from planner.files.yaml_site import parse_site
+from planner.ground import Heights
 from planner.placement.maps import Grid, look, standing_m
 from planner.placement.ranking import place
 from planner.placement.task import task_of
@@ -34,9 +35,8 @@ def ridged(height_m=100.0):
 
 def task_with(heights):
     task = task_of(parse_site(SITE), count=2)
-    return replace(
-        task, terrain=HeightRaster(heights, WEST, NORTH, CELL, CELL, "above_sea_level"), head_height_m=2.0
-    )
+    raster = HeightRaster(heights, WEST, NORTH, CELL, CELL, "above_sea_level")
+    return replace(task, terrain=Heights(raster, raster), head_height_m=2.0)
 
 
 def test_no_lidar_is_put_behind_the_ridge():
@@ -68,9 +68,8 @@ def test_a_place_beyond_the_raster_is_unknown_and_so_not_allowed():
 
 
 def test_a_target_outside_the_raster_is_named():
-    task = replace(task_with(np.ones((10, 10))))
-    with pytest.raises(InputError, match="target a"):
-        place(task, Grid(np.linspace(446000, 446400, 3), np.linspace(6258000, 6257600, 3)))
+    with pytest.raises(InputError, match="target a is not known: outside the height raster"):
+        task_with(np.ones((10, 10)))
 
 
 class TestFiles:

@@ -12,12 +12,11 @@ from planner.files.yaml_site import parse_site
 from planner.plan import Plan
 from planner.simulation import Options, draw_states, virtual
 from reconstruct.alignment import time_lag
-from reconstruct.flight import subgrid_root
 from reconstruct.rays import Rays
 from reconstruct.sector_scan import sector_wind
 from reconstruct.spectra import Turbulence
 from reconstruct.uncertainty import ErrorSources
-from reconstruct.virtual import Flown, VirtualScan, VirtualSettings, fly, split_sources, subgrid_std
+from reconstruct.virtual import Flown, VirtualScan, VirtualSettings, fly, split_sources
 from reconstruct.wind import WindState, from_deg
 
 SITE = """\
@@ -189,15 +188,13 @@ def test_the_mast_meets_the_turbulence_that_was_asked_for() -> None:
     assert np.mean(along) == pytest.approx(8.0, abs=0.15)
 
 
-def test_small_eddies_between_the_knots_of_a_fan_are_as_if_each_ray_were_worked_out() -> None:
-    """The variance that is added is under a tenth of the turbulence's; it is met to a fiftieth of itself."""
-    rays = fan(np.arange(-29.0, 30.0, 2.0))
-    for angle in (180.0, 220.0, 270.0):
-        root = subgrid_root(rays, WindState(9.0, angle), Turbulence(0.1, 170.0), np.pi / 34.0)
-        wanted = np.sum(root**2, axis=1)
-        found = subgrid_std(rays, WindState(9.0, angle), Turbulence(0.1, 170.0), np.pi / 34.0) ** 2
-        assert np.max(wanted) < 0.1
-        np.testing.assert_allclose(found, wanted, rtol=0.02)
+def test_scans_and_reference_share_the_eddies_that_they_meet() -> None:
+    """Two lidars in one place that stare along one beam see the same air, down to the smallest eddy."""
+    stare = fan(np.array([0.0]), period_s=2.0)
+    scans = [scan_of(stare), scan_of(stare, lidar=1)]
+    settings = VirtualSettings(averaging_s=60.0, spacing_m=16.0)
+    period = flown(scans, [WindState(8.0, 180.0)], turbulence=Turbulence(0.15, 80.0), settings=settings)[0]
+    np.testing.assert_allclose(period.radial_speed_mps[0], period.radial_speed_mps[1], atol=1e-5)
 
 
 def test_nothing_to_fly_is_told() -> None:

@@ -92,6 +92,19 @@ def test_chunks_end_with_a_sweep_and_lose_nothing(place):
     assert all(set(a.sweep_id).isdisjoint(b.sweep_id) for a, b in pairwise(chunks))
 
 
+def test_a_stare_is_read_in_chunks_and_of_the_gate_that_is_wanted_alone(place):
+    """One sweep without an end: no chunk is longer than twice the rays that are fetched at once."""
+    whole = campaign(rays=100)
+    stare = replace(whole, azimuth_deg=np.full(100, 180.0), sweep_id=np.zeros(100))
+    write_aas(stare, place, scan_type="LOS")
+    chunks = list(aas_chunks(place, Options(scenario=7), rays=16, range_m=710.0))
+    assert max(chunk.rays for chunk in chunks) <= 32
+    assert {(chunk.gates, float(chunk.range_m[0])) for chunk in chunks} == {(1, 716.0)}
+    speeds = np.concatenate([chunk.radial_speed_mps for chunk in chunks])
+    np.testing.assert_array_equal(speeds, stare.radial_speed_mps[:, 2:3])
+    assert {int(number) for chunk in chunks for number in chunk.sweep_id} == {0}
+
+
 def test_a_scenario_is_taken_by_its_number_and_written_once(place):
     write_aas(campaign(scan_id=1), place)
     later = campaign(scan_id=2)

@@ -7,8 +7,8 @@ import pytest
 
 from geometry.errors import InputError, UnavailableError
 from reconstruct.formats import Options, detect, read
-from reconstruct.formats.cf_write import write_netcdf
 from reconstruct.formats.cfradial import read_cfradial
+from reconstruct.formats.own_netcdf import write_netcdf
 
 xr = pytest.importorskip("xarray", reason="the extra 'data' is not installed")
 nc = pytest.importorskip("netCDF4", reason="the extra 'data' is not installed")

@@ -361,7 +361,7 @@ def test_nothing_that_can_be_read_is_an_error_that_says_why(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read(tmp_path / "absent.txt")
     (tmp_path / "scanner.txt").write_text("1;2.0;3.0;4.0\n" * 3, encoding="utf-8")
-    with pytest.raises(InputError, match="belongs to another file"):
+    with pytest.raises(InputError, match="holds no rays: it is a WindScanner scanner"):
         read(tmp_path / "scanner.txt")
     with pytest.raises(InputError, match="there is no kind of file"):
         read(tmp_path / "scanner.txt", kind="magic")

@@ -12,9 +12,10 @@ from geometry.head import Mounting
 from reconstruct.cnr_map import CnrMap
 from reconstruct.cnr_simulation import Signal, simulate_cnr_map
 from reconstruct.hard_target import find_target
-from reconstruct.mounting_fit import Sighting, fit_mounting
+from reconstruct.mounting_fit import fit_mounting
 from reconstruct.range_fit import edge_range, peak_range
 from reconstruct.sea_level import level_from_sea, sea_range_m
+from reconstruct.sightings import Sighting
 
 PROBE = Probe(pulse_ns=200, window_ns=256)
 SIZES_M = {"mast": 1.0, "tip": 1.0, "boom": 1.0}

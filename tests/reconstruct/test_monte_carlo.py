@@ -13,13 +13,14 @@ from geometry.beams import unit_vector
 from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
-from reconstruct.error_draws import draw_pointing
-from reconstruct.flight import Sampling, beams, reach_m, subgrid_root, to_wind_frame
+from reconstruct.error_draws import Draws, draw_pointing
+from reconstruct.flight import Sampling, WaveSight, beams, reach_m, to_wind_frame
 from reconstruct.monte_carlo import Scene, Settings, scans_in, simulate, simulate_scenes
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.uncertainty import ErrorSources
 from reconstruct.verdict import Estimate, Simulation, judge
+from reconstruct.waves import Waves, draw_waves
 from reconstruct.wind import WindState, from_deg, speed_mps, vector_mean
 
 PROBE = Probe(pulse_ns=200, window_ns=256)
@@ -245,19 +246,26 @@ def test_stare_has_the_variance_that_the_probe_leaves(turbulent):
     assert_agrees(mixed, 0.0)
 
 
-def subgrid_variance(rays, wind):
-    root = subgrid_root(rays, wind, AIR, np.pi / 10.0)
-    return np.diag(root @ root.T)
+def short_covariance(rays, wind):
+    """What waves shorter than two cells of 10 m add to the rays, without drawing their amplitudes."""
+    rng = np.random.default_rng(3)
+    waves = draw_waves(AIR, np.pi / 10.0, rng=rng, long_count=1, short_count=200_000)
+    waves = Waves(*(part[:, 1:] for part in waves))
+    seen = WaveSight.of(rays, wind, waves, Draws.none(rays)).seen[0].astype(float)
+    return seen.T @ seen  # real and imaginary part of an amplitude have variance 1 each
 
 
-def test_subgrid_part_of_a_ray_is_the_tail_of_its_integral():
+def test_short_waves_give_a_ray_the_tail_of_its_integral():
     still = WindState(speed_mps=0.0, from_deg=210.0)
-    assert subgrid_variance(stares(), still) == pytest.approx(radial_variance(np.pi / 10.0), rel=0.03)
+    found = np.diag(short_covariance(stares(), still))
+    assert found == pytest.approx(radial_variance(np.pi / 10.0), rel=0.03)
 
 
 def test_sweep_and_passing_wind_leave_less_of_the_small_eddies():
     azimuth, wind = np.array([80.0, 90.0, 100.0]), WindState(speed_mps=8.0, from_deg=0.0)
-    standing, sweeping = (subgrid_variance(sector(azimuth, swept_deg=turn), wind) for turn in (0.0, 5.0))
+    standing, sweeping = (
+        np.diag(short_covariance(sector(azimuth, swept_deg=turn), wind)) for turn in (0.0, 5.0)
+    )
     assert np.all(sweeping < 0.4 * standing)
 
 
@@ -267,8 +275,7 @@ def test_two_lidars_on_one_line_share_all_small_eddies_and_at_right_angles_none(
     for azimuth, expected in ((180.0, -1.0), (90.0, 0.0)):
         crossed = replace(stares(), azimuth_deg=np.array([azimuth, 0.0]))
         crossed = replace(crossed, head_m=-300.0 * unit_vector(crossed.azimuth_deg, np.zeros(2)))
-        root = subgrid_root(crossed, still, AIR, np.pi / 10.0)
-        covariance = root @ root.T
+        covariance = short_covariance(crossed, still)
         assert covariance[0, 1] / covariance[0, 0] == pytest.approx(expected, abs=0.02)
 
 

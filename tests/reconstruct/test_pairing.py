@@ -87,9 +87,25 @@ def test_a_larger_gap_gives_more_pairs_and_more_wind_that_has_changed() -> None:
     assert results[-1].share > 0.9
     errors = []
     for result in results:
-        seconds = (result.wind.time_utc - START) / np.timedelta64(1, "s")
-        errors.append(np.sqrt(np.mean((result.wind.fit.wind_mps - wind(seconds)) ** 2)))
+        pairs = dual_wind(first, second, gap_s=result.gap_s)
+        seconds = (pairs.time_utc - START) / np.timedelta64(1, "s")
+        errors.append(np.sqrt(np.mean((pairs.fit.wind_mps - wind(seconds)) ** 2)))
+        assert result.mean_gap_s == pytest.approx(np.mean(np.abs(pairs.gap_s)))
     assert errors == sorted(errors)
+    parts = (
+        compare_gaps(first.at(slice(0, 50)), second)[2],
+        compare_gaps(first.at(slice(50, None)), second)[2],
+    )
+    assert (parts[0] + parts[1]).pairs >= results[2].pairs
+
+
+def test_the_spread_of_paired_winds_is_that_of_their_speeds_within_ten_minutes() -> None:
+    """Two periods, each steady but for +-1 m/s; the step of 4 m/s between them does not count."""
+    seconds = np.arange(0.0, 1200.0, 10.0)
+    speed = np.where(seconds < 600, 6.0, 10.0) + np.where(np.arange(len(seconds)) % 2, 1.0, -1.0)
+    wind = np.stack([np.zeros(len(seconds)), speed], axis=1)
+    result = compare_gaps(series(seconds, 30.0, wind), series(seconds, 300.0, wind), gaps_s=[0.5])[0]
+    assert result.spread_mps == pytest.approx(np.sqrt(60 / 59), abs=1e-3)
 
 
 def test_nothing_to_pair_and_bad_input_are_told() -> None:

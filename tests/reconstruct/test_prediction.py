@@ -89,7 +89,9 @@ def test_dual_doppler_check_numbers() -> None:
 
 
 def test_the_map_is_the_linear_tier_at_every_target() -> None:
-    """Six targets of a map, all sources, shear, vertical wind and gradient, equal the general way."""
+    """Six targets of a map, all sources, shear, vertical wind and gradient, equal the general way; the condition is
+    that of the rows by singular values.
+    """
     wind = WindState(
         10.0, 30.0, shear_exponent=0.2, height_m=100.0, vertical_mps=0.2, lateral_gradient_per_s=0.001
     )
@@ -105,6 +107,8 @@ def test_the_map_is_the_linear_tier_at_every_target() -> None:
         total = budget(wind_covariance_by_source(fit, rays, wind, both), wind)[-1]
         assert float(got.speed_std_mps[i, j]) == pytest.approx(total.speed_std_mps, rel=1e-9)
         assert float(got.direction_std_deg[i, j]) == pytest.approx(total.direction_std_deg, rel=1e-9)
+        singular = np.linalg.svd(rows(rays.azimuth_deg, rays.elevation_deg), compute_uv=False)
+        assert float(got.condition[i, j]) == pytest.approx(singular[0] / singular[1], rel=1e-12)
 
 
 def test_the_map_says_nothing_where_nothing_can_be_known() -> None:

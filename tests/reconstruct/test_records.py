@@ -171,7 +171,10 @@ def test_the_store_gives_back_what_it_got_in_chunks_that_end_with_a_sweep(tmp_pa
     one = read_store(path, range_m=1030.0)
     np.testing.assert_array_equal(one.range_m, [1025.0])
     np.testing.assert_array_equal(one.radial_speed_mps[:, 0], whole.radial_speed_mps[:, 1])
-    assert [len(c.range_m) for c in store_chunks(path, range_m=1030.0, values=2)] == [1] * 20
+    assert [c.rays for c in store_chunks(path, range_m=1030.0, values=7)] == [6] * 20
+    cut = list(store_chunks(path, range_m=1030.0, values=4))  # sweeps of six do not fit: 4 and 2
+    assert [c.rays for c in cut] == [4, 2] * 20
+    np.testing.assert_array_equal(np.concatenate([c.sweep_id for c in cut]), whole.sweep_id)
 
 
 def test_the_store_keeps_instruments_apart_and_refuses_rays_it_has(tmp_path):
