@@ -17,7 +17,7 @@ from planner.palette import EXCLUDED, OBSTACLE, lidar_colour
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
 from planner.scan_plans import PointsScan, RasterScan
-from planner.scene import Label, Layer, Points, Scene, layers, views
+from planner.scene import Label, Layer, Points, Scene, beam_layers, layers, views
 from planner.scene.model import View, positions_m
 from planner.scene.structures import obstacle
 
@@ -173,7 +173,7 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
     last_m = max(layout.gates.last_m, seen_m) if layout.gates else seen_m
     measured_m, probe_m = layout.target_range_m or last_m, layout.probe.length_m
     if layout.scan.count == 1:
-        return layers.stare_layer(
+        return beam_layers.stare_layer(
             _short(layout.lidar.name),
             colour,
             head,
@@ -186,7 +186,7 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
             scan=_short(layout.name),
         )
     if isinstance(layout.spec, PointsScan | RasterScan):
-        return layers.spokes_layer(
+        return beam_layers.spokes_layer(
             _short(layout.lidar.name),
             colour,
             head,
@@ -196,7 +196,7 @@ def _scan(plan: Plan, layout: ScanLayout) -> Layer:
             probe_length_m=probe_m,
             scan=_short(layout.name),
         )
-    return layers.fan_layer(
+    return beam_layers.fan_layer(
         _short(layout.lidar.name),
         colour,
         head,
@@ -215,7 +215,7 @@ def _lost(plan: Plan) -> Iterator[Layer]:
     ends = [_lost_ends_m(plan, layout) for layout in plan.layouts]
     lost = np.concatenate([np.empty((0, 2, 3)), *ends])
     if len(lost):
-        yield layers.lost_layer(lost[:, 0], lost[:, 1], hover="lost behind something solid")
+        yield beam_layers.lost_layer(lost[:, 0], lost[:, 1], hover="lost behind something solid")
 
 
 def _lost_ends_m(plan: Plan, layout: ScanLayout) -> FloatArray:
@@ -335,7 +335,7 @@ def _crossing(plan: Plan, met: PairCrossing) -> Iterator[Layer]:
     lines = [beam_line(plan.places, plan.layout[name], met.target) for name in (met.scan1, met.scan2)]
     points = cross(*lines[0], *lines[1])
     if np.all(np.isfinite([points.point1_m, points.point2_m])):
-        yield layers.crossing_layer(
+        yield beam_layers.crossing_layer(
             "crossing", _met(plan, met), points.point1_m, points.point2_m, ground_m=GROUND_M
         )
 

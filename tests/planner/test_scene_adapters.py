@@ -13,7 +13,7 @@ import pytest
 
 from geometry.errors import UnavailableError
 from planner import palette
-from planner.scene import gltf_adapter, layers, opengl, plotly_adapter, pyvista_adapter
+from planner.scene import beam_layers, gltf_adapter, layers, opengl, plotly_adapter, pyvista_adapter
 from planner.scene.model import Label, Layer, Lines, Mesh, Points, Scene, View
 from planner.scene.solids import ellipsoid
 from planner.scene.structures import OVERHANG
@@ -41,7 +41,7 @@ def _angles(head_m: np.ndarray) -> tuple[float, float, float]:
 def _stare(name: str, index: int, first_m: float) -> Layer:
     azimuth, elevation, range_m = _angles(HEADS_M[name])
     gates = first_m + 25.0 * np.arange(41)
-    return layers.stare_layer(
+    return beam_layers.stare_layer(
         name,
         palette.lidar_colour(index),
         HEADS_M[name],
@@ -59,10 +59,10 @@ def _sector() -> tuple[Layer, Layer]:
     colour = palette.lidar_colour(1)
     rays = azimuth - 29 + 2 * np.arange(30)
     head = HEADS_M["WS_S"]
-    fan = layers.fan_layer(
+    fan = beam_layers.fan_layer(
         "WS_S", colour, head, rays, elevation, reach_m=1666, measured_range_m=1166, probe_length_m=42.6
     )
-    arcs = layers.range_arc_layer(
+    arcs = beam_layers.range_arc_layer(
         "WS_S", colour, head, [500, 1000, 1500], from_deg=azimuth - 30, width_deg=60, ground_m=GROUND_M
     )
     return fan, arcs
@@ -76,7 +76,7 @@ def hovsore(title: str = "Høvsøre SSvsDD 2014", mast: str = "met mast") -> Sce
         _stare("WS_K", 0, 635.0),
         *_sector(),
         _stare("WS_W", 2, 1125.0),
-        layers.crossing_layer(
+        beam_layers.crossing_layer(
             "crossing",
             "K and W meet: 63.1°",
             AIM_M,
