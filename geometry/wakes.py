@@ -175,7 +175,7 @@ def iec_sector_width_deg(distance_over_diameter: ArrayLike) -> FloatArray:
 
     Notes
     -----
-    α = 1.3 arctan(2.5 D/L + 0.15) + 10°, arctan in degrees: IEC 61400-12-1:2017, Annex A.
+    α = 1.3 arctan(2.5 D/L + 0.15) + 10°, arctan in degrees: IEC 61400-12-1, Annex A, of 2005 and 2017.
 
     Examples
     --------

@@ -9,6 +9,7 @@ import hashlib
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,16 +23,19 @@ from planner.analysis_files import (
     write_fast_parquet,
     write_log,
     write_means,
+    write_sonics,
 )
 from planner.attitude_files import Logged, logged, write_drifts
 from planner.beam_files import BeamParts, write_beams
 from planner.campaign import Campaign, RayInput
+from planner.clocks import ClockLag, clock_lag, trim_sonic
 from planner.files.yaml_campaign import Loaded
 from planner.kept_parts import Kept, read_kept, write_kept
+from planner.mast_file import read_mast
 from planner.output import output_folder
-from planner.pair_retrieval import partners_of, retrieve_pair
+from planner.pair_retrieval import kept_series, partners_of, retrieve_pair
 from planner.plan import Plan
-from planner.pointing_log import NOTHING_KNOWN, Known, Pointed, pointed
+from planner.pointing_log import NOTHING_KNOWN, Known, Pointed, pointed, require_log
 from planner.ray_files import Part, gate_of, parts_of
 from planner.scan_jobs import ScanJob, jobs_of
 from planner.scan_retrieval import add_steps, empty_part, retrieve_part
@@ -43,6 +47,7 @@ from reconstruct.records import Records, join
 
 VERSION = 3  # of what is kept of a part; another one is worked on anew
 WORK = ".parts"
+STAGING = "results"
 
 Progress = Callable[[float], None]
 
@@ -68,17 +73,21 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
     InputError
         If data cannot be read, or no scan gives any wind.
     """
-    campaign, plan = loaded.campaign, Plan(loaded.site)
-    work = campaign.output / WORK / key_of(loaded)
+    plan = Plan(loaded.site)
     if restart:
-        shutil.rmtree(campaign.output / WORK, ignore_errors=True)
+        shutil.rmtree(loaded.campaign.output / WORK, ignore_errors=True)
+    loaded, clocks = _clocks_set(loaded, plan)
+    campaign, work = loaded.campaign, loaded.campaign.output / WORK / key_of(loaded)
     todo = _jobs(campaign, plan)
     jobs = {job.name: job for _, job in todo}
     partners = {name for pair in campaign.pairs for name in partners_of(pair, plan, jobs)}
     merged = {name: _Merged() for name in jobs}
     sums = SumFiles(work / "sums")
     beams: BeamParts = {}
-    with output_folder(campaign.output) as folder:
+    for item in campaign.inputs:
+        require_log(item.attitude)
+    shutil.rmtree(work / STAGING, ignore_errors=True)  # of a run that was killed
+    with output_folder(campaign.output, within=work / STAGING) as folder:
         for number, (item, job) in enumerate(todo):
             own = campaign if item.filters is None else campaign.model_copy(update={"filters": item.filters})
             for kept, was_there, share in _worked(item, job, own, plan, work):
@@ -94,13 +103,17 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
                     beams.setdefault((job.name, period_s), []).append((radial, part.gates_m))
                 _tell(progress, (number + share) / (len(todo) + bool(campaign.pairs)))
         gaps = {pair.pair: retrieve_pair(pair, campaign, plan, work, folder, sums) for pair in campaign.pairs}
-        write_beams(folder, plan.places, jobs, beams)
+        two_beam = write_beams(folder, plan.places, jobs, beams)
         means = write_means(folder, campaign, _results(todo, campaign, plan), sums)
         logs = {name: log for name, each in merged.items() if (log := each.logged) is not None}
         write_drifts(folder, logs)
+        trimmed = {
+            sonic.name: trim_sonic(sonic, partial(kept_series, work, sonic.scan)) for sonic in campaign.sonics
+        }
+        write_sonics(folder, {name: wind for name, (_, wind) in trimmed.items()}, campaign)
         found = Retrieved(
             folder=campaign.output,
-            steps={name: each.steps for name, each in merged.items()},
+            steps={name: (*each.steps, *two_beam.get(name, ())) for name, each in merged.items()},
             lost={name: each.lost for name, each in merged.items()},
             agreements={name: each.agreement for name, each in merged.items()},
             notes={name: each.notes for name, each in merged.items()},
@@ -109,6 +122,8 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
             means=means,
             gaps=gaps,
             drifts=logs,
+            clocks=clocks,
+            sonics={name: trim for name, (trim, _) in trimmed.items()},
             resumed=sum(each.resumed for each in merged.values()),
         )
         write_fast_parquet(folder)
@@ -122,6 +137,26 @@ def key_of(loaded: Loaded) -> str:
     """A name for a campaign and its site: the same for the same settings, another for any other."""
     told = (VERSION, loaded.campaign.model_dump_json(), loaded.site.model_dump_json())
     return hashlib.sha256(repr(told).encode()).hexdigest()[:16]
+
+
+def _clocks_set(loaded: Loaded, plan: Plan) -> tuple[Loaded, dict[str, ClockLag]]:
+    """The campaign with each lidar's clock moved by its lag against the mast, if that is asked for."""
+    campaign = loaded.campaign
+    if campaign.time_lag.against == "none" or campaign.mast is None:
+        return loaded, {}
+    mast, longest_s = read_mast(campaign.mast), campaign.time_lag.longest_s
+    work = campaign.output / WORK / f"{key_of(loaded)}-clocks"
+    found: dict[str, ClockLag] = {}
+    inputs = []
+    for item in campaign.inputs:
+        job = _jobs(campaign.model_copy(update={"inputs": (item,)}), plan)[0][1]
+        job = job._replace(sizes=job.sizes[:1])  # the rays at the target are wanted, no wind
+        series = (kept.part.series for kept, _, _ in _worked(item, job, campaign, plan, work))
+        lag = found[job.name] = clock_lag(series, mast, longest_s=longest_s)
+        late_s = lag.lag_s if np.isfinite(lag.lag_s) else 0.0
+        offsets = item.offsets.model_copy(update={"clock_s": item.offsets.clock_s - late_s})
+        inputs.append(item.model_copy(update={"offsets": offsets}))
+    return loaded._replace(campaign=campaign.model_copy(update={"inputs": tuple(inputs)})), found
 
 
 def _jobs(campaign: Campaign, plan: Plan) -> list[tuple[RayInput, ScanJob]]:
@@ -186,11 +221,11 @@ def _worked(
 ) -> Iterator[tuple[Kept, bool, float]]:
     """The parts of one input, each worked on or taken from an earlier run, with the share that is done."""
     pending: Records | None = None
-    known = NOTHING_KNOWN
+    known, log = NOTHING_KNOWN, require_log(item.attitude)
     parts = parts_of(item, job.layout, plan.places, job.range_m, rays=campaign.chunk_rays)
     for number, (part, last) in enumerate(_with_last(parts)):
         place = work / f"{file_name(job.name)}-{number:06d}.npz"
-        mark = f"{part.fingerprint} {_ends_of(pending)} {last} {known}"
+        mark = f"{part.fingerprint} {_ends_of(pending)} {last} {known} {log}"
         kept = read_kept(place, mark)
         was_there = kept is not None
         if kept is None:

@@ -9,11 +9,13 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from planner.attitude_files import Logged, told_drifts
-from planner.campaign import Campaign
+from planner.campaign import CNR_DB, Campaign
+from planner.clocks import ClockLag, SonicTrim, told_clock, told_trims
+from planner.mast_file import WindSeries
 from planner.scan_retrieval import periods_of
 from planner.sum_files import SumFiles
 from reconstruct.automatic_filter import Agreement
-from reconstruct.averaging import TimeArray, means_of
+from reconstruct.averaging import TimeArray, means_of, period_means
 from reconstruct.duck import bounded_duck, quoted
 from reconstruct.filters import Step
 from reconstruct.pairing import GapResult
@@ -24,6 +26,15 @@ ALONE = (
     "one lidar's beam alone: its radial speed, and the part of the wind along it; u, v, speed and direction need the "
     "beam of another lidar (`pairs`)"
 )
+
+
+NOTHING_LEFT = {
+    "in the scan": "the rays lie elsewhere than the site's scan; check the scan, `angles` and `offsets`",
+    "near a point": "the rays look elsewhere than the site's points; check the scan, `angles` and `offsets`",
+    "CNR": "check filters.cnr_db",
+    "radial speed": "check filters.radial_speed_mps",
+    "partial scans": "every scan lacks a ray; allow partial ones, such as filters.ray_share: 0.8",
+}
 
 
 class Result(NamedTuple):
@@ -46,6 +57,8 @@ class Retrieved(NamedTuple):
     means: dict[float, int]  # rows by period [s]; empty where there are radial speeds alone
     gaps: dict[str, tuple[GapResult, ...]]  # by pair
     drifts: dict[str, Logged]  # of attitude logs, by scan
+    clocks: dict[str, ClockLag]  # lags against the mast, by scan; empty where they are not asked for
+    sonics: dict[str, SonicTrim]  # by sonic
     resumed: int  # parts that an earlier run had done
 
 
@@ -107,12 +120,15 @@ def write_means(
         path = folder / f"means_{period_s:g}s.csv"
         for key, total in sums.totals(period_s):
             means, told = means_of(total), results[key.name]
+            if not len(means.count):  # no wind at all of this size: told by its count
+                continue
             frame = means.frame()
             frame.insert(0, "scan", key.name)
             frame.insert(1, "sector_deg", key.sector_deg)
             frame.insert(2, "height_m", np.nan if told.height_m is None else told.height_m)
             frame["availability"] = means.availability(told.interval_s)
-            frame["time_utc"] = np.datetime_as_string(means.time_utc, unit="s" if period_s % 1 == 0 else "ms")
+            stamps = np.datetime_as_string(means.time_utc, unit="s" if period_s % 1 == 0 else "ms")
+            frame["time_utc"] = np.char.replace(stamps, "T", " ")  # as in the table of single scans
             frame.to_csv(
                 path, mode="a", header=not path.exists(), index=False, float_format="%.5f", encoding="utf-8"
             )
@@ -122,22 +138,21 @@ def write_means(
     return rows
 
 
+def write_sonics(folder: Path, winds: Mapping[str, WindSeries], campaign: Campaign) -> None:
+    """Write means of the sonics, trimmed, stamped at the end of each period: files that `mast` reads."""
+    for name, wind in winds.items():
+        for period_s in periods_of(campaign):
+            if period_s >= wind.interval_s:
+                means = period_means(wind.time_utc, wind.u_mps, wind.v_mps, period_s=period_s)
+                path = folder / f"sonic_{file_name(name)}_{period_s:g}s.csv"
+                means.frame().to_csv(path, index=False, float_format="%.5f", encoding="utf-8")
+
+
 def write_log(folder: Path, titles: tuple[str, str], found: Retrieved) -> None:
     """Write what was turned, taken away and found, as text, and the same counts for machines."""
     lines = [f"campaign {titles[0]}, site {titles[1]}"]
-    for scan, steps in found.steps.items():
-        lines += ["", f"scan {scan}", *(f"  {note}" for note in found.notes[scan])]
-        lines.append(f"  measured azimuths less the planned ones: {found.offsets_deg[scan]:+.3f}°")
-        lines += [f"  {told(step)}" for step in steps]
-        lines += [f"  no wind: {line}" for line in told_losses(found.lost[scan])]
-        lines += [f"  {line}" for line in (told_drifts(found.drifts[scan]) if scan in found.drifts else ())]
-        if scan in found.alone:
-            lines.append(f"  {ALONE}")
-        agreement = found.agreements[scan]
-        if any(agreement):
-            names = ("both", "usual CNR limits only", "the automatic filter only", "neither")
-            counted = ", ".join(f"{name} {count}" for name, count in zip(names, agreement, strict=True))
-            lines.append(f"  rays kept by: {counted}")
+    for scan in found.steps:
+        lines += ["", f"scan {scan}", *(f"  {line}" for line in scan_lines(found, scan))]
     for pair, gaps in found.gaps.items():
         lines += ["", f"pair {pair}"]
         lines += [
@@ -145,6 +160,7 @@ def write_log(folder: Path, titles: tuple[str, str], found: Retrieved) -> None:
             f"standard deviation within ten minutes {gap.spread_mps:.3f} m/s"
             for gap in gaps
         ]
+    lines += ["", *told_trims(found.sonics)] if found.sonics else []
     (folder / "retrieve.log").write_text("\n".join(lines) + "\n", encoding="utf-8")
     counts: dict[str, list[dict[str, object]]] = {
         scan: [
@@ -154,6 +170,29 @@ def write_log(folder: Path, titles: tuple[str, str], found: Retrieved) -> None:
         for scan, steps in found.steps.items()
     }
     (folder / "filters.json").write_text(json.dumps(counts, ensure_ascii=False, indent=1), encoding="utf-8")
+
+
+def scan_lines(found: Retrieved, scan: str) -> list[str]:
+    """What was turned, taken away and found of one scan, a line each."""
+    lines = [*found.notes[scan], f"measured azimuths less the planned ones: {found.offsets_deg[scan]:+.3f}°"]
+    lines += [told_clock(found.clocks[scan])] if scan in found.clocks else []
+    lines += told_drifts(found.drifts[scan]) if scan in found.drifts else []
+    lines += [told(step) for step in found.steps[scan]]
+    emptied = next((step for step in found.steps[scan] if step.before and not step.after), None)
+    if emptied is not None:
+        lines.append(f"nothing is left: {NOTHING_LEFT.get(emptied.name, 'see the counts above')}")
+    elif not found.steps[scan]:
+        lines.append("nothing is left: no ray could be read, see above")
+    agreement = found.agreements[scan]
+    if any(agreement):
+        both, limits, automatic, neither = agreement
+        lines.append(
+            f"automatic filter beside the usual CNR limits of {CNR_DB[0]:g} to {CNR_DB[1]:g} dB: both keep {both} rays, "
+            f"the limits alone {limits}, the filter alone {automatic}, neither {neither}"
+        )
+    if scan in found.alone:
+        return [*lines, ALONE]
+    return lines + [f"no wind: {line}" for line in told_losses(found.lost[scan])]
 
 
 def told_losses(lost: Mapping[str, int]) -> list[str]:

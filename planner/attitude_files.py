@@ -4,10 +4,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from reconstruct.attitude import Drift, LogMeans, add_log_means, drifts
+import numpy as np
 
-#: Two independent means and a line leave nothing to judge the line by.
-TOO_SHORT = "too short or too even a log to tell its standard error"
+from reconstruct.attitude import Drift, LogMeans, add_log_means, drifts
 
 
 class Logged(NamedTuple):
@@ -29,17 +28,20 @@ def told_drifts(log: Logged) -> list[str]:
     Examples
     --------
     >>> told_drifts(Logged({"heading_deg": Drift(0.5, 0.1, 1.0, 0.012, True, 144, 90.0)}, 3))
-    ['logged heading: 1.000 ± 0.012° a day over 144 means of ten minutes (significant at 5 %), mean change +0.50°',
+    ['logged heading: mean change +0.50°; drift +1.000 ± 0.012° a day over 144 means of ten minutes (significant at 5 %)',
      '3 rays have no logged attitude: they take the nearest one']
     """
     lines = []
     for name, drift in log.drifts.items():
-        told = f"{drift.per_day_deg:.3f} ± {drift.standard_error_deg:.3f}° a day over {drift.means} means of ten minutes"
-        verdict = f"({'' if drift.significant else 'not '}significant at 5 %)"
-        if drift.standard_error_deg != drift.standard_error_deg:
-            told, verdict = f"its drift is not known, {TOO_SHORT}", f"({drift.means} means of ten minutes)"
-        change = f"mean change {drift.change_deg:+.2f}°"
-        lines.append(f"logged {name.removesuffix('_deg')}: {told} {verdict}, {change}")
+        angle = f"logged {name.removesuffix('_deg')}: mean change {round(drift.change_deg, 2) + 0.0:+.2f}°"
+        if np.isnan(drift.standard_error_deg):
+            lines.append(
+                f"{angle}; {drift.means} mean{'s' * (drift.means != 1)} of ten minutes, too few to tell a drift"
+            )
+            continue
+        verdict = f"{'' if drift.significant else 'not '}significant at 5 %"
+        slope = f"{drift.per_day_deg:+.3f} ± {drift.standard_error_deg:.3f}° a day"
+        lines.append(f"{angle}; drift {slope} over {drift.means} means of ten minutes ({verdict})")
     if log.unlogged:
         lines.append(f"{log.unlogged} rays have no logged attitude: they take the nearest one")
     return lines

@@ -1,18 +1,22 @@
 """Tables of what one lidar knows by itself: period means of radial speeds, of every beam and gate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geometry.angles import difference_deg
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from planner.analysis_files import file_name
+from planner.campaign import TwoBeam
 from planner.places import Places
 from planner.scan_jobs import ScanJob
 from reconstruct.averaging import expected_count
 from reconstruct.beam_means import BeamSums, add_beam_sums, along_beam_mps, beam_means
+from reconstruct.filters import Step
+from reconstruct.two_beam_means import TwoBeamMeans, trusted_means
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,24 +25,72 @@ BeamParts = dict[tuple[str, float], list[tuple[BeamSums, FloatArray]]]
 """Sums of the parts of a scan with the ranges of their gates, by its name and period."""
 
 
-def write_beams(folder: Path, places: Places, jobs: Mapping[str, ScanJob], parts: BeamParts) -> None:
-    """Write `beams_<scan>_<period>s` as CSV and Parquet for every scan that is no fan.
+def write_beams(
+    folder: Path, places: Places, jobs: Mapping[str, ScanJob], parts: BeamParts
+) -> dict[str, tuple[Step, ...]]:
+    """Write `beams_<scan>_<period>s` as CSV and Parquet for every scan that is no fan, or has two beams.
+
+    Of two beams the winds along and across the axis are written too, as `two_beam_...`.
+
+    Returns
+    -------
+    dict
+        What the rules of two beams took away, by scan.
 
     Raises
     ------
     InputError
         If the gates of a scan change between its files.
     """
+    steps: dict[str, tuple[Step, ...]] = {}
+    for (name, period_s), found in parts.items():
+        job, tail = jobs[name], f"{file_name(name)}_{period_s:g}s.csv"
+        _write(beam_table(places, job, found), folder / f"beams_{tail}")
+        if job.two_beam is not None:
+            means = two_beam_means_of(job, job.two_beam, [sums for sums, _ in found])
+            _write(_two_beam_table(means), folder / f"two_beam_{tail}")
+            steps[name] = means.steps
+    return steps
+
+
+def _write(frame: "pd.DataFrame", path: Path) -> None:
+    """A table as CSV, and as Parquet beside it."""
     import duckdb
 
-    for (name, period_s), found in parts.items():
-        frame = beam_table(places, jobs[name], found)
-        path = folder / f"beams_{file_name(name)}_{period_s:g}s.csv"
-        frame.to_csv(path, index=False, float_format="%.5f", encoding="utf-8")
-        target = str(path.with_suffix(".parquet")).replace("'", "''")
-        with duckdb.connect() as connection:
-            connection.register("beams", frame)
-            connection.execute(f"COPY beams TO '{target}' (FORMAT parquet)")
+    frame.to_csv(path, index=False, float_format="%.5f", encoding="utf-8")
+    target = str(path.with_suffix(".parquet")).replace("'", "''")
+    with duckdb.connect() as connection:
+        connection.register("beams", frame)
+        connection.execute(f"COPY beams TO '{target}' (FORMAT parquet)")
+
+
+def two_beam_means_of(job: ScanJob, rules: TwoBeam, parts: Sequence[BeamSums]) -> TwoBeamMeans:
+    """Winds relative to the axis between two beams, of the periods that pass every rule; left is the first clockwise."""
+    sums = add_beam_sums(parts)
+    means = beam_means(sums)
+    ends, place = np.unique(means.time_utc, return_inverse=True)
+    count, mean = np.zeros((len(ends), 2), dtype=np.intp), np.full((len(ends), 2), np.nan)
+    count[place, means.cell], mean[place, means.cell] = means.count, means.radial_speed_mps
+    scan = job.layout.scan
+    opening = float(np.asarray(difference_deg(scan.azimuth_deg[1], scan.azimuth_deg[0])))
+    return trusted_means(
+        ends,
+        count,
+        mean,
+        half_angle_deg=opening / 2,
+        elevation_deg=float(np.mean(scan.elevation_deg)),
+        least_samples=rules.least_samples,
+        least_speed_mps=rules.least_speed_mps,
+        largest_angle_deg=rules.largest_angle_deg,
+    )
+
+
+def _two_beam_table(means: TwoBeamMeans) -> "pd.DataFrame":
+    import pandas as pd
+
+    left, right = means.samples.T
+    wind = means.wind._asdict()
+    return pd.DataFrame({"time_utc": means.time_utc, "samples_left": left, "samples_right": right, **wind})
 
 
 def beam_table(places: Places, job: ScanJob, parts: list[tuple[BeamSums, FloatArray]]) -> "pd.DataFrame":
@@ -79,7 +131,7 @@ def beam_table(places: Places, job: ScanJob, parts: list[tuple[BeamSums, FloatAr
 
 def _gates(job: ScanJob, each: list[FloatArray]) -> FloatArray:
     """True ranges of the gates that the cells count."""
-    if job.kind == "beam":
+    if job.kind != "grid":
         return np.array([job.range_m], dtype=float)
     known = [gates for gates in each if len(gates)]
     if any(len(gates) != len(known[0]) or np.max(np.abs(gates - known[0])) > 1.0 for gates in known):

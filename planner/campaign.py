@@ -91,6 +91,19 @@ class Filters(Noun):
     """Standard deviation of one radial speed, for the reduced chi square. E.g. 0.2"""
 
 
+class TwoBeam(Noun):
+    """Rules by which the means of a two-beam lidar are kept; the defaults are those of the WindEye test."""
+
+    period_s: Positive = 120.0
+    """Averaging period. E.g. 600"""
+    least_samples: Count = 100
+    """Least number of good samples of each beam in a period. E.g. 500"""
+    least_speed_mps: NonNegative = 1.0
+    """Least mean radial speed of each beam, without its sign. E.g. 0.5"""
+    largest_angle_deg: Positive = 30.0
+    """Largest angle of the wind from the lidar's axis. E.g. 20"""
+
+
 class RayInput(Noun):
     """The measured rays of one scan of the site."""
 
@@ -115,6 +128,12 @@ class RayInput(Noun):
     """Ranges of several gates, each a result of its own: a profile. Without it: one gate. E.g. [500, 1000, 1500]"""
     fit_columns: Literal[2, 3] | None = None
     """Components of this scan's fit. Without it: the campaign's `columns`. E.g. 3"""
+    beam_azimuth_deg: dict[int, Number] | None = None
+    """Nacelle CSV: azimuth of each line of sight by its LOSindex, from the lidar's zero. Without it: no such file can
+    be read. E.g. {0: -30, 1: 30}"""
+    two_beam: TwoBeam | None = None
+    """Means along and across the axis of a scan of two beams, by these rules. Without it: winds alone, as of any
+    sector."""
     offsets: Offsets = Offsets()
     """What is added to what the files say."""
     stamp: Literal["auto", "start", "middle", "end"] = "auto"
@@ -179,6 +198,17 @@ class Averaging(Noun):
     """Averaging period of the comparison with the mast. E.g. 1800"""
 
 
+class MastLevel(Noun):
+    """A height of the mast with instruments of its own."""
+
+    height_m: Positive
+    """Height above the ground. E.g. 60"""
+    speed: Name
+    """Column of the wind speed there. E.g. WSP060"""
+    direction: Name | None = None
+    """Column of the direction there. Without it: the mast's `direction`. E.g. WDIR060"""
+
+
 class MastInput(Noun):
     """A mast's CSV, its columns, and where in the period its stamps stand."""
 
@@ -202,6 +232,15 @@ class MastInput(Noun):
     """What stands between two columns. E.g. ';'"""
     missing: tuple[Number, ...] = (9999.0, -9999.0)
     """Numbers that stand for nothing. E.g. [-999]"""
+    levels: tuple[MastLevel, ...] = ()
+    """Heights of the mast: each scan is compared with the one nearest to it, and a profile is drawn. Without it:
+    `speed` and `direction` for every scan."""
+
+    def at_level(self, level: MastLevel) -> "MastInput":
+        """The same file with the columns of one of its heights."""
+        return self.model_copy(
+            update={"speed": level.speed, "direction": level.direction or self.direction, "levels": ()}
+        )
 
 
 class PairInput(Noun):
@@ -212,7 +251,8 @@ class PairInput(Noun):
     gap_s: NonNegative | None = None
     """Longest time between the rays of a pair. Without it: half a ray where synchronised, else 5 s. E.g. 2"""
     compare_gaps_s: tuple[NonNegative, ...] | None = None
-    """Further times, whose pairs are counted for comparison. E.g. [0.5, 2, 5, 8]"""
+    """Further times, whose pairs are counted for comparison. Without it: 0.5, 2, 5 and 8 s where not synchronised.
+    E.g. [1, 3]"""
 
 
 def _text_of_pair(value: object) -> object:

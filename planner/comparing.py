@@ -1,5 +1,6 @@
 """A campaign's means against its mast, per scan and sector size, beside what was predicted."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,7 +12,10 @@ from geometry.errors import InputError
 from planner.campaign import Campaign, MastInput
 from planner.error_nouns import SizeError
 from planner.files.yaml_campaign import Loaded
+from planner.mast_file import read_mast
 from planner.plan import Plan
+from planner.scan_jobs import job_name
+from reconstruct.agreement import Difference, set_beside
 from reconstruct.averaging import PeriodMeans, TimeArray, period_means
 from reconstruct.comparison import (
     DirectionFit,
@@ -24,19 +28,9 @@ from reconstruct.comparison import (
 )
 from reconstruct.filters import Step, limit_availability, limit_directions, limit_speed
 from reconstruct.prediction import Tier
-from reconstruct.wind import uv_mps
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FORESEEN = (
-    "slope",
-    "slope_std",
-    "residual_std_mps",
-    "mean10_speed_bias_mps",
-    "mean10_speed_std_mps",
-    "direction_residual_std_deg",
-)  # numbers of the prediction that stand in the table
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +39,8 @@ class Matched:
 
     scan: str
     sector_deg: float | None  # None for a pair
+    height_m: float | None  # of what the lidar measures, above the ground
+    mast_height_m: float | None  # of the mast's level; None where the campaign does not say
     time_utc: TimeArray  # (period,) ends
     lidar_mps: FloatArray  # (period,) scalar means
     lidar_deg: FloatArray
@@ -63,6 +59,26 @@ class Row(NamedTuple):
     weibull: WeibullFit  # of the lidar's speeds
     predicted: SizeError | None
 
+    @property
+    def slope_beside(self) -> Difference | None:
+        """Measured and predicted slope, by the measurement's scatter and the errors that stay for a whole campaign."""
+        errors = (self.speed.slope_standard_error, self.foreseen("slope_std"))
+        return set_beside(self.speed.slope, self.foreseen("slope"), errors=errors)
+
+    @property
+    def scatter_beside(self) -> Difference | None:
+        """Measured and predicted standard deviation of mast - slope · lidar."""
+        measured = self.speed.residual_std_mps
+        errors = (self.speed.residual_std_standard_error_mps,)
+        return set_beside(measured, self.foreseen("residual_std_mps"), errors=errors)
+
+    @property
+    def direction_beside(self) -> Difference | None:
+        """Measured and predicted standard deviation of the directions about their line."""
+        measured = self.direction.residual_std_deg
+        errors = (self.direction.residual_std_standard_error_deg,)
+        return set_beside(measured, self.foreseen("direction_residual_std_deg"), errors=errors)
+
     def foreseen(self, name: str) -> float | None:
         """One predicted number; None where there is none."""
         return None if self.predicted is None else self.predicted.values.get(name)  # noqa: PD011
@@ -74,6 +90,7 @@ class Comparison(NamedTuple):
     rows: tuple[Row, ...]
     mast_weibull: WeibullFit
     period_s: float
+    levels: Mapping[float | None, PeriodMeans]  # of the mast, by height
 
 
 def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -> Comparison:
@@ -99,9 +116,9 @@ def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -
         raise InputError(
             "the campaign has no mast: give `mast: {path: ...}` with a CSV of its speed and direction"
         )
-    plan = Plan(loaded.site)
-    mast = mast_means(campaign.mast, campaign.averaging.compare_s)
-    matched = matches(_means_table(campaign), mast, plan, campaign)
+    plan, table = Plan(loaded.site), _means_table(campaign)
+    levels = mast_levels(campaign.mast, campaign.averaging.compare_s)
+    matched = matches(table, levels, plan, campaign)
     predicted = (
         _predictions(Plan(loaded.site.model_copy(update={"fidelity": "all"})), campaign, tier)
         if predict
@@ -119,7 +136,20 @@ def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -
         for each in matched
     )
     widest = max(matched, key=lambda each: len(each.time_utc))
-    return Comparison(rows, fit_weibull(widest.mast_mps), campaign.averaging.compare_s)
+    return Comparison(rows, fit_weibull(widest.mast_mps), campaign.averaging.compare_s, levels)
+
+
+def mast_levels(mast: MastInput, period_s: float) -> dict[float | None, PeriodMeans]:
+    """Period means of every level of a mast by its height; of one that does not say its height under None.
+
+    Raises
+    ------
+    InputError
+        As `mast_means`.
+    """
+    if not mast.levels:
+        return {None: mast_means(mast, period_s)}
+    return {level.height_m: mast_means(mast.at_level(level), period_s) for level in mast.levels}
 
 
 def mast_means(mast: MastInput, period_s: float) -> PeriodMeans:
@@ -130,39 +160,26 @@ def mast_means(mast: MastInput, period_s: float) -> PeriodMeans:
     InputError
         If the file lacks a column, holds no number, or its own periods are longer.
     """
-    import pandas as pd
-
-    try:
-        frame = pd.read_csv(mast.path, sep=mast.separator, skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        raise InputError(f"mast file {mast.path} cannot be read as CSV ({error})") from error
-    if missing := [name for name in (mast.time, mast.speed, mast.direction) if name not in frame.columns]:
-        have = ", ".join(map(str, frame.columns))
+    found = read_mast(mast)
+    if found.interval_s > period_s + 1e-6:
         raise InputError(
-            f"mast file {mast.path} has no column {', '.join(missing)}; it has {have}: give the names under `mast`"
+            f"mast file {mast.path} has means over {found.interval_s:g} s, longer than the {period_s:g} s to be compared"
         )
-    time = pd.to_datetime(frame[mast.time], utc=True, errors="coerce", format="ISO8601")
-    stamps = time.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
-    speed, angle = (_numbers(frame[name], mast) for name in (mast.speed, mast.direction))
-    known = ~np.isnat(stamps)
-    if np.count_nonzero(known) < 2:
-        raise InputError(
-            f"mast file {mast.path} has fewer than two times in {mast.time}: they have to be ISO 8601, UTC"
-        )
-    interval_s = mast.interval_s or float(np.median(np.diff(np.sort(stamps[known])) / np.timedelta64(1, "s")))
-    if interval_s > period_s + 1e-6:
-        raise InputError(
-            f"mast file {mast.path} has means over {interval_s:g} s, longer than the {period_s:g} s to be compared"
-        )
-    middle_s = (0.5 if mast.stamp == "start" else -0.5) * interval_s + mast.clock_s
-    u, v = uv_mps(speed, angle + mast.direction_offset_deg)
-    return period_means(stamps[known], u[known], v[known], period_s=period_s, shift_s=middle_s)
+    return period_means(found.time_utc, found.u_mps, found.v_mps, period_s=period_s)
 
 
-def matches(table: "pd.DataFrame", mast: PeriodMeans, plan: Plan, campaign: Campaign) -> tuple[Matched, ...]:
-    """For every scan and size the periods that count, with counts of what each condition took."""
+def matches(
+    table: "pd.DataFrame", levels: Mapping[float | None, PeriodMeans], plan: Plan, campaign: Campaign
+) -> tuple[Matched, ...]:
+    """For every scan and size the periods that count, with counts of what each condition took.
+
+    Each is set beside the level of the mast that is nearest to its height.
+    """
     found = []
     for (scan, sector), part in table.groupby(["scan", "sector_deg"], sort=False, dropna=False):
+        height_m = float(part["height_m"].iloc[0])
+        level_m = nearest_level(levels, height_m)
+        mast = levels[level_m]
         time = part["time_utc"].to_numpy().astype("datetime64[ns]")
         shared, here, there = np.intersect1d(time, mast.time_utc, return_indices=True)
         sector_deg = float(str(sector))
@@ -180,6 +197,8 @@ def matches(table: "pd.DataFrame", mast: PeriodMeans, plan: Plan, campaign: Camp
             Matched(
                 scan=str(scan),
                 sector_deg=size,
+                height_m=None if np.isnan(height_m) else height_m,
+                mast_height_m=level_m,
                 time_utc=shared[kept],
                 lidar_mps=lidar["speed_mps"].to_numpy(dtype=float)[kept],
                 lidar_deg=lidar["from_deg"].to_numpy(dtype=float)[kept],
@@ -198,30 +217,12 @@ def matches(table: "pd.DataFrame", mast: PeriodMeans, plan: Plan, campaign: Camp
     return tuple(found)
 
 
-def table_rows(comparison: Comparison) -> list[dict[str, object]]:
-    """The comparison as rows of a table, one for each scan and size."""
-    rows: list[dict[str, object]] = []
-    for row in comparison.rows:
-        told: dict[str, object] = {"scan": row.matched.scan, "sector_deg": row.matched.sector_deg}
-        told |= row.speed._asdict()
-        told |= {
-            f"direction_{name}": value for name, value in row.direction._asdict().items() if name != "pairs"
-        }
-        told |= {
-            f"direction_plain_{name}": getattr(row.plainly, name)
-            for name in ("slope", "intercept_deg", "r_squared")
-        }
-        told |= {"weibull_scale_mps": row.weibull.scale_mps, "weibull_shape": row.weibull.shape}
-        told |= {f"predicted_{name}": row.foreseen(name) for name in FORESEEN}
-        rows.append(told)
-    return rows
-
-
-def _numbers(column: "pd.Series[float]", mast: MastInput) -> FloatArray:
-    import pandas as pd
-
-    values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=float)
-    return np.where(np.isin(values, mast.missing), np.nan, values)
+def nearest_level(levels: Mapping[float | None, PeriodMeans], height_m: float) -> float | None:
+    """The height of the level nearest to a height; of a height that is not known the highest level."""
+    known = [level for level in levels if level is not None]
+    if not known:
+        return None
+    return max(known) if np.isnan(height_m) else min(known, key=lambda level: abs(level - height_m))
 
 
 def _means_table(campaign: Campaign) -> "pd.DataFrame":
@@ -257,7 +258,7 @@ def _allowed(plan: Plan, scan: str, campaign: Campaign) -> SectorSet:
         return SectorSet.of(Sector.between(start, stop) for start, stop in asked)
     if plan.site.wind is not None and plan.site.wind.directions_deg is not None:
         return plan.wanted
-    scans = {scan} if scan in plan.layout else set(plan.site.pair(scan).scans)
+    scans = _scans_behind(plan, scan)
     allowed = SectorSet.full()
     for item in plan.exclusions:
         if item.scan in scans:
@@ -265,9 +266,24 @@ def _allowed(plan: Plan, scan: str, campaign: Campaign) -> SectorSet:
     return allowed
 
 
+def _scans_behind(plan: Plan, result: str) -> set[str]:
+    """Scans of the site that a result was made of; one of several points or gates is named after its scan."""
+    own = {name for name in plan.layout if result == name or result.startswith(job_name(name, ""))}
+    return own or set(plan.site.pair(result).scans)
+
+
 def _predictions(
     plan: Plan, campaign: Campaign, tier: Tier | None
 ) -> dict[tuple[str, float | None], SizeError]:
-    """The predicted error of each scan's sizes, as the middle rays of the scan, and of each pair."""
+    """The predicted error of each scan's sizes, as the middle rays of the scan, and of each pair.
+
+    It is of fits with two columns, but for the pairs, which say how many theirs has: a scan with three has none.
+    """
     curves = plan.errors(tier=tier, sizes_deg=campaign.sizes_deg, sizes_from="subset")
-    return {(curve.scan, size.sector_deg): size for curve in curves for size in curve.sizes}
+    three = {item.scan for item in campaign.inputs if (item.fit_columns or campaign.columns) == 3}
+    return {
+        (curve.scan, size.sector_deg): size
+        for curve in curves
+        for size in curve.sizes
+        if curve.lidar is None or curve.scan not in three
+    }

@@ -10,7 +10,9 @@ has edited) is written with `new_text`.
 
 import os
 import shutil
+import signal
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,13 +21,16 @@ from geometry.errors import InputError
 
 
 @contextmanager
-def output_folder(folder: Path) -> Iterator[Path]:
+def output_folder(folder: Path, *, within: Path | None = None) -> Iterator[Path]:
     """Collect the files of one run and put them into a folder together.
 
     Parameters
     ----------
     folder : Path
         Where the files go; made when the run has succeeded.
+    within
+        Where they are collected, on the same disk; default: above the folder. What a run that was killed left
+        there can be removed with it.
 
     Yields
     ------
@@ -38,8 +43,9 @@ def output_folder(folder: Path) -> Iterator[Path]:
         If the folder cannot be written to: said before the block runs.
     """
     require_folder(folder)
-    parent = _nearest_folder(folder)
+    parent = _nearest_folder(folder) if within is None else within
     try:
+        parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=parent))
     except OSError as error:
         raise _refusal(folder, error) from error
@@ -140,10 +146,27 @@ def _move_all(staging: Path, folder: Path) -> None:
                 raise IsADirectoryError(21, "a folder of that name is in the way", str(place))
             place.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
-        for path, place in zip(files, places, strict=True):
-            path.replace(place)
+        with _uninterrupted():
+            for path, place in zip(files, places, strict=True):
+                path.replace(place)
     except OSError as error:
         raise _refusal(folder, error) from error
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Let Ctrl-C wait until a block is done: half of the files in place would be half a result."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if waiting:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _nearest_folder(folder: Path) -> Path:

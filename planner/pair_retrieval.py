@@ -34,7 +34,7 @@ def retrieve_pair(
         shortest = min(plan.layout[name].spec.accumulation_s for name in declared.scans)
         gap_s = shortest / 2 if declared.synchronised else UNSYNCHRONISED_GAP_S
     names = (result_name(plan.layout[name], declared.target) for name in declared.scans)
-    streams = [_kept_series(work, name) for name in names]
+    streams = [kept_series(work, name) for name in names]
     asked = (
         STUDY_GAPS_S
         if pair.compare_gaps_s is None and not declared.synchronised
@@ -78,7 +78,8 @@ def partners_of(pair: PairInput, plan: Plan, jobs: Mapping[str, ScanJob]) -> tup
     return names
 
 
-def _kept_series(work: Path, scan: str) -> Iterator[RaySeries]:
+def kept_series(work: Path, scan: str) -> Iterator[RaySeries]:
+    """The rays at the target that the kept parts of a scan hold, part by part."""
     for place in sorted(work.glob(f"{file_name(scan)}-{'[0-9]' * 6}.npz")):
         yield read_series(place)
 

@@ -76,6 +76,26 @@ def pointed(
     return _mounted(records, item, layout, places, known)
 
 
+def require_log(asked: Attitude) -> str:
+    """Read a separate log before any ray.
+
+    Returns
+    -------
+    str
+        What changes when the log does; empty where there is none.
+
+    Raises
+    ------
+    InputError
+        If it is asked for and cannot be read, or has not the columns that it is said to have.
+    """
+    if asked.path is None:
+        return ""
+    _read_log(asked.path, asked.time, (asked.heading, asked.pitch, asked.roll), asked.separator)
+    stat = Path(asked.path).stat()
+    return f"{stat.st_size} {stat.st_mtime_ns}"
+
+
 def mounting_of(item: RayInput, layout: ScanLayout, places: Places) -> Mounting:
     """The site's mounting with the input's own offsets on top; of true angles the offsets alone."""
     stands = places.mounting(layout.lidar) if item.angles == "head" else Mounting()
@@ -156,7 +176,7 @@ def _logged(records: Records, asked: Attitude) -> FloatArray:
 def _interpolated(time_utc: TimeArray, asked: Attitude) -> list[FloatArray]:
     """The columns of a separate log at the times of rays; NaN before its beginning and after its end."""
     names = (asked.heading, asked.pitch, asked.roll)
-    stamps, logged = _read_log(str(asked.path), asked.time, names, asked.separator)
+    stamps, logged = _read_log(asked.path or "", asked.time, names, asked.separator)
     ticks = time_utc.astype(np.int64).astype(float)
     found = []
     for column in logged:

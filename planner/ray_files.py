@@ -60,7 +60,7 @@ def parts_of(
         return
     paths = _files(str(item.path))
     for number, path in enumerate(paths):
-        kind = detect(path) if item.kind == "auto" else item.kind
+        kind = _kind(path) if item.kind == "auto" else item.kind
         if kind == "database":
             yield from _chunked(_database(path, item, rays, head_m))
         elif kind == "store":
@@ -70,6 +70,14 @@ def parts_of(
             mark = f"{path.name} {stat.st_size} {stat.st_mtime_ns}"
             load = _loader(path, item)
             yield Part(load, mark, (number + 1) / len(paths), len(paths) == 1, False)
+
+
+def _kind(path: Path) -> str | None:
+    """What a file is; None where it cannot be found out: whoever loads the piece says why, and goes on."""
+    try:
+        return detect(path)
+    except InputError:
+        return None
 
 
 def at_gate(

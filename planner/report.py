@@ -31,6 +31,7 @@ from planner.figures.site_map import site_map
 from planner.figures.tradeoff import tradeoff_figure
 from planner.figures.wake_rose import wake_rose
 from planner.finding import Finding, told_once
+from planner.handover.field_sheet import sheet_html, sheet_style
 from planner.output import output_folder
 from planner.plan import Plan
 from planner.plan_scene import plan_scene
@@ -260,6 +261,7 @@ def _page(reports: Sequence[SiteReport], progress: Progress) -> str:
         rows=list(zip(*(report.numbers for report in reports), strict=True)),
         made=made_line(),
         policy=_policy(scripts),
+        sheet_style=Markup(sheet_style()),
         palette=palette,
         quantity=quantity,
     )
@@ -294,6 +296,7 @@ def _site(report: SiteReport, progress: Progress) -> dict[str, object]:
         "assumptions": assumptions(plan.site),
         "findings": report.findings,
         "convergence_deg": plan.convergence_deg,
+        "sheets": Markup(sheet_html(plan, heading="h4")) if plan.site.lidars else "",
     }
     return {**numbers, **report.pictures}
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from geometry.angles import difference_deg
 from geometry.errors import InputError
-from planner.campaign import RayInput
+from planner.campaign import RayInput, TwoBeam
 from planner.error_curve import default_sizes
 from planner.places import Places
 from planner.ray_sets import sector_rays, subset_of
@@ -33,6 +33,7 @@ from reconstruct.scan_grid import (
 
 Kind = Literal["fan", "beam", "grid"]
 
+OF = ", "  # between a scan and one of its points or gates
 FARTHEST_POINT_DEG = 1.0  # a ray farther than this from a point of a list looks at something else
 
 
@@ -57,6 +58,7 @@ class ScanJob(NamedTuple):
     target_m: float | None = None  # true range of the gate at the target
     sizes: tuple[Size, ...] = ()  # of a fan
     columns: Literal[2, 3] = 2  # of the fit
+    two_beam: TwoBeam | None = None  # rules, where both beams are averaged on their own
 
     @property
     def rays_stand_alone(self) -> bool:
@@ -102,6 +104,13 @@ def jobs_of(
     job = _towards(layout, places, 0)
     if spec.type != "stare":
         job = job._replace(kind="fan", sizes=_sizes(layout, sizes_deg), columns=item.fit_columns or columns)
+    if item.two_beam is not None:
+        if spec.type != "sector" or layout.scan.count != 2:
+            raise InputError(
+                f"two_beam came with scan '{layout.name}', a {spec.type} of {layout.scan.count} rays: it belongs to a sector "
+                "of two, such as sector_deg: 60, step_deg: 60, motion: step"
+            )
+        job = job._replace(two_beam=item.two_beam)
     if item.gates_m is not None:
         return tuple(
             _at_gate(job, places, gate_m)._replace(name=job_name(layout.name, f"{gate_m:g} m"))
@@ -124,7 +133,18 @@ def job_name(scan: str, part: str) -> str:
     >>> job_name("tour", "hub")
     'tour, hub'
     """
-    return f"{scan}, {part}"
+    return f"{scan}{OF}{part}"
+
+
+def scan_of(result: str) -> str:
+    """The scan that a result is named after, or the pair.
+
+    Examples
+    --------
+    >>> scan_of("circle, 200 m"), scan_of("dual")
+    ('circle', 'dual')
+    """
+    return result.rsplit(OF, 1)[0]
 
 
 def result_name(layout: ScanLayout, target: str) -> str:

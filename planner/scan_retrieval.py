@@ -97,7 +97,12 @@ def _fan_part(
             for period_s in periods_of(campaign)
         }
     together = {name: np.concatenate([table[name] for table in fast]) for name in fast[0]}
-    return part._replace(fast=together, sums=sums, steps=tuple(steps), lost=lost)
+    beams = {}
+    if job.two_beam is not None:
+        known = np.isfinite(filtered)
+        cell = np.broadcast_to(np.arange(filtered.shape[1]), filtered.shape)[known]
+        beams = _beam_sums(grid.time_utc[known], cell, filtered[known], campaign, [job.two_beam.period_s])
+    return part._replace(fast=together, sums=sums, beams=beams, steps=tuple(steps), lost=lost)
 
 
 def _beam_part(part: ScanPart, campaign: Campaign) -> ScanPart:
@@ -141,8 +146,13 @@ def _grid_part(records: Records, job: ScanJob, campaign: Campaign) -> ScanPart:
 
 
 def _beam_sums(
-    time_utc: TimeArray, cell: IntArray, radial_speed_mps: FloatArray, campaign: Campaign
+    time_utc: TimeArray,
+    cell: IntArray,
+    radial_speed_mps: FloatArray,
+    campaign: Campaign,
+    periods_s: Sequence[float] | None = None,
 ) -> dict[float, BeamSums]:
+    """Sums over each period; default: the campaign's."""
     return {
         period_s: beam_sums(
             time_utc,
@@ -151,7 +161,7 @@ def _beam_sums(
             period_s=period_s,
             shift_s=campaign.averaging.time_shift_s,
         )
-        for period_s in periods_of(campaign)
+        for period_s in periods_s or periods_of(campaign)
     }
 
 

@@ -2,9 +2,9 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from planner.simulation import (
 )
 from reconstruct.averaging import period_means
 from reconstruct.records import Records
+
+if TYPE_CHECKING:
+    from reconstruct.formats.aas_scenarios import Scenarios
 
 Format = Literal["csv", "parquet", "store", "netcdf", "windscanner", "database"]
 FORMATS: tuple[Format, ...] = ("csv", "parquet", "store", "netcdf", "windscanner", "database")
@@ -69,8 +72,7 @@ def write_virtual(
         Format of the rays.
     url
         Of a database, as SQLAlchemy writes it, variables of the environment included; default: an SQLite file
-        in the folder. Other than a folder it keeps what an interrupted run has written, as scenarios of their
-        own.
+        in the folder. It gets all scenarios of the run in one transaction, or none.
     progress
         Gets the share that is done.
 
@@ -88,13 +90,13 @@ def write_virtual(
         raise InputError(f"--url came with --format {kind}: it belongs to --format database")
     campaign = virtual(plan, options)
     with output_folder(out) as folder:
-        rays = _RayWriter(plan, folder, kind, url)
         parts = _watched(campaign_parts(campaign, plan, options), len(campaign.states), progress)
-        for day in _days(parts):
-            for layout in campaign.layouts:
-                rays.write(layout.name, joined([part.records[layout.name] for part in day]))
-            _append_mast(folder / "mast.csv", [part.mast for part in day])
-            _append(folder / "truth.csv", [true_means(part) for part in day])
+        with _ray_writer(plan, folder, kind, url) as rays:
+            for day in _days(parts):
+                for layout in campaign.layouts:
+                    rays.write(layout.name, joined([part.records[layout.name] for part in day]))
+                _append_mast(folder / "mast.csv", [part.mast for part in day])
+                _append(folder / "truth.csv", [true_means(part) for part in day])
         (folder / "site.yaml").write_text(site_text, encoding="utf-8")
         text = campaign_text(plan, {layout.name: rays.told(layout.name) for layout in campaign.layouts})
         (folder / "campaign.yaml").write_text(text, encoding="utf-8")
@@ -126,13 +128,28 @@ def campaign_text(plan: Plan, inputs: Mapping[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
+@contextmanager
+def _ray_writer(plan: Plan, folder: Path, kind: Format, url: str | None) -> "Iterator[_RayWriter]":
+    """Open what the rays go into; a database gets all of them when the block ends, or none."""
+    if kind != "database":
+        yield _RayWriter(plan, folder, kind, url, None)
+        return
+    from reconstruct.formats.aas_scenarios import scenarios_of
+
+    with scenarios_of(folder / DATABASE if url is None else os.path.expandvars(url)) as scenarios:
+        yield _RayWriter(plan, folder, kind, url, scenarios)
+
+
 class _RayWriter:
     """Writes rays in one format, and knows how the campaign file has to tell of them."""
 
-    def __init__(self, plan: Plan, folder: Path, kind: Format, url: str | None) -> None:
+    def __init__(
+        self, plan: Plan, folder: Path, kind: Format, url: str | None, scenarios: "Scenarios | None"
+    ) -> None:
         self._plan, self._folder, self._kind, self._url = plan, folder, kind, url
+        self._scenarios = scenarios
         self._days: dict[str, int] = {}
-        self._scenarios: dict[str, list[int]] = {}
+        self._numbers: dict[str, list[int]] = {}
 
     def write(self, scan: str, records: Records) -> None:
         """Write the rays of one scan and day."""
@@ -166,23 +183,19 @@ class _RayWriter:
             stored = ", azimuth: stored" if kind == "windscanner" else ""
             return f"kind: {kind}, path: {_quoted(pattern.format(file_name(scan)))}{stored}"
         where = f"path: {DATABASE}" if self._url is None else f"url: {_quoted(self._url)}"
-        return f"kind: database, {where}, scenarios: {self._scenarios[scan]}"
+        return f"kind: database, {where}, scenarios: {self._numbers[scan]}"
 
     def _write_scenario(self, scan: str, records: Records) -> None:
-        from reconstruct.formats.aas_scenarios import next_scenario
-        from reconstruct.formats.aas_write import write_aas
-
-        place = self._folder / DATABASE if self._url is None else os.path.expandvars(self._url)
-        number = next_scenario(place)
+        if self._scenarios is None:
+            raise ValueError("no database is open")
         layout = self._plan.layout[scan]
-        write_aas(
-            replace(records, scan_id=np.full(records.rays, number)),
-            place,
+        number = self._scenarios.write(
+            records,
             scan_type="LOS" if layout.spec.type == "stare" else "PPI",
             pulse_ns=layout.probe.pulse_ns,
             fft_points=round(layout.probe.window_ns / layout.lidar.device.sample_ns),
         )
-        self._scenarios.setdefault(scan, []).append(number)
+        self._numbers.setdefault(scan, []).append(number)
 
 
 def _quoted(text: str) -> str:

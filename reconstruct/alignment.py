@@ -11,6 +11,8 @@ from geometry.errors import InputError
 
 MIN_OVERLAP = 10  # samples that two shifted series must share
 MIN_CORRELATION = 0.2  # below it the best lag is chance
+LAG_STEPS = 30  # lags that are tried on each side; the parabola finds those between
+LONGEST_GAP = 3.0  # of the usual step of a reference: a longer one is not bridged
 
 
 class Lag(NamedTuple):
@@ -64,10 +66,84 @@ def time_lag(reference: ArrayLike, series: ArrayLike, *, interval_s: float, long
         )
     lags = np.arange(-most, most + 1)
     found = np.array([_correlation(*_shifted(one, other, int(lag))) for lag in lags])
+    return _best_lag(np.asarray(lags * interval_s, dtype=float), found)
+
+
+def sample_lag(
+    reference_s: ArrayLike,
+    reference: ArrayLike,
+    sample_s: ArrayLike,
+    sample: ArrayLike,
+    *,
+    weights: ArrayLike = 1.0,
+    longest_s: float,
+    steps: int = LAG_STEPS,
+) -> Lag:
+    """Find the lag of samples that were taken at times of their own, such as the rays of a scan.
+
+    Parameters
+    ----------
+    reference_s : array_like
+        (time,) rising [s].
+    reference : array_like
+        (time,) or (time, part): what is compared with, NaN where missing.
+    sample_s, sample : array_like
+        (sample,) times [s] and values, NaN where missing.
+    weights : array_like
+        (part,) or (sample, part): what a sample sees of each part, such as the beam's direction of the wind's
+        components.
+    longest_s : float
+        Largest lag that is looked for, to either side [s].
+    steps : int
+        Lags that are tried on each side.
+
+    Returns
+    -------
+    Lag
+        As of `time_lag`.
+
+    Notes
+    -----
+    For each lag the reference is taken, straight between its samples, at the samples' times less the lag. Where its
+    samples are farther apart than three times their usual step nothing is known.
+
+    Examples
+    --------
+    >>> time = np.arange(0.0, 600.0, 2.0)
+    >>> ray = np.sort(np.random.default_rng(1).uniform(50.0, 550.0, 300))
+    >>> lag = sample_lag(time, np.sin(time / 9.0), ray, np.sin((ray - 4.3) / 9.0), longest_s=10.0)
+    >>> round(lag.lag_s, 1), round(lag.correlation, 2)
+    (4.3, 1.0)
+    """
+    at, when = np.asarray(reference_s, dtype=float), np.asarray(sample_s, dtype=float)
+    parts = np.asarray(reference, dtype=float).reshape(len(at), -1)
+    seen = np.broadcast_to(np.asarray(weights, dtype=float), (len(when), parts.shape[1]))
+    measured = np.asarray(sample, dtype=float)
+    known = np.all(np.isfinite(parts), axis=1)
+    at, parts = at[known], parts[known]
+    if len(at) < MIN_OVERLAP or not longest_s > 0 or steps < 1:
+        return Lag(float("nan"), float("nan"))
+    apart = LONGEST_GAP * float(np.median(np.diff(at)))
+    lags = np.linspace(-longest_s, longest_s, 2 * steps + 1)
+    found = np.array([_correlation(_taken(at, parts, seen, when - lag, apart), measured) for lag in lags])
+    return _best_lag(lags, found)
+
+
+def _taken(at: FloatArray, parts: FloatArray, seen: FloatArray, when: FloatArray, apart: float) -> FloatArray:
+    """A reference at some times, as it is seen; NaN outside it and in its gaps."""
+    total = np.zeros(len(when))
+    for column, weight in zip(parts.T, seen.T, strict=True):
+        total += weight * np.interp(when, at, column, left=np.nan, right=np.nan)
+    after = np.clip(np.searchsorted(at, when), 1, len(at) - 1)
+    return np.where(at[after] - at[after - 1] <= apart, total, np.nan)
+
+
+def _best_lag(lags: FloatArray, found: FloatArray) -> Lag:
+    """Where the correlation is highest, between the lags that were tried."""
     if not np.any(np.isfinite(found)) or np.nanmax(found) < MIN_CORRELATION:
         return Lag(float("nan"), float(np.nanmax(found)) if np.any(np.isfinite(found)) else float("nan"))
     best = int(np.nanargmax(found))
-    return Lag(float((lags[best] + _vertex(found, best)) * interval_s), float(found[best]))
+    return Lag(float(lags[best] + _vertex(found, best) * (lags[1] - lags[0])), float(found[best]))
 
 
 class Trim(NamedTuple):

@@ -4,6 +4,7 @@ Mast first: the fit is mast = slope · lidar, and a residual is mast - slope · 
 2015, Tables 10 and 11). Bias, where it stands, is lidar - mast.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ class SpeedFit(NamedTuple):
     residual_std_mps: float  # about its mean, n - 1
     bias_mps: float  # lidar - mast
     std_mps: float  # of lidar - mast about the bias
+    residual_std_standard_error_mps: float  # as of the slope
 
 
 class DirectionFit(NamedTuple):
@@ -43,6 +45,7 @@ class DirectionFit(NamedTuple):
     residual_std_deg: float
     bias_deg: float  # circular mean of lidar - mast
     std_deg: float  # of lidar - mast about it
+    residual_std_standard_error_deg: float  # from leaving out blocks of consecutive pairs
 
 
 def fit_speed(mast_mps: ArrayLike, lidar_mps: ArrayLike, *, blocks: int = _JACKKNIFE_BLOCKS) -> SpeedFit:
@@ -74,7 +77,7 @@ def fit_speed(mast_mps: ArrayLike, lidar_mps: ArrayLike, *, blocks: int = _JACKK
     """
     mast, lidar = _pairs(mast_mps, lidar_mps)
     if len(mast) < MIN_PAIRS or not np.any(lidar):
-        return SpeedFit(len(mast), *[float("nan")] * 9)
+        return SpeedFit(len(mast), *[float("nan")] * 10)
     slope = _through_origin(mast, lidar)
     residual = mast - slope * lidar
     squares = float(residual @ residual)
@@ -82,6 +85,7 @@ def fit_speed(mast_mps: ArrayLike, lidar_mps: ArrayLike, *, blocks: int = _JACKK
         pairs=len(mast),
         slope=slope,
         slope_standard_error=_jackknife(mast, lidar, min(blocks, len(mast))),
+        residual_std_standard_error_mps=_jackknife_of(_residual_std, mast, lidar, min(blocks, len(mast))),
         r_squared=_share(squares, float(np.sum(np.square(mast - np.mean(mast))))),
         r_squared_uncentred=_share(squares, float(mast @ mast)),
         residual_median_mps=float(np.median(residual)),
@@ -119,7 +123,7 @@ def fit_direction(mast_deg: ArrayLike, lidar_deg: ArrayLike) -> DirectionFit:
     """
     mast, lidar = _pairs(mast_deg, lidar_deg)
     if len(mast) < MIN_PAIRS:
-        return DirectionFit(len(mast), *[float("nan")] * 7)
+        return DirectionFit(len(mast), *[float("nan")] * 8)
     centre = float(circular_mean_deg(lidar))
     centre = 180.0 if np.isnan(centre) else centre
     across = centre + np.asarray(wrap_180_deg(lidar - centre))
@@ -137,7 +141,7 @@ def fit_direction_plainly(mast_deg: ArrayLike, lidar_deg: ArrayLike) -> Directio
     """
     mast, lidar = _pairs(mast_deg, lidar_deg)
     if len(mast) < MIN_PAIRS:
-        return DirectionFit(len(mast), *[float("nan")] * 7)
+        return DirectionFit(len(mast), *[float("nan")] * 8)
     return _line(mast, lidar, mast, lidar)
 
 
@@ -292,6 +296,30 @@ def _jackknife(mast: FloatArray, lidar: FloatArray, blocks: int) -> float:
     return float(np.sqrt((1 - 1 / blocks) * np.sum(np.square(slopes - np.mean(slopes)))))
 
 
+def _jackknife_of(
+    statistic: Callable[[FloatArray, FloatArray], float], one: FloatArray, other: FloatArray, blocks: int
+) -> float:
+    """Standard error of any statistic of pairs, made anew without each block."""
+    parts = np.array_split(np.arange(len(one)), blocks)
+    if len(one) - max(map(len, parts)) < MIN_PAIRS:
+        return float("nan")
+    each = np.array([statistic(np.delete(one, part), np.delete(other, part)) for part in parts])
+    return float(np.sqrt((1 - 1 / blocks) * np.sum(np.square(each - np.mean(each)))))
+
+
+def _residual_std(mast: FloatArray, lidar: FloatArray) -> float:
+    return float(np.std(mast - _through_origin(mast, lidar) * lidar, ddof=1))
+
+
+def _line_residual_std(y: FloatArray, x: FloatArray) -> float:
+    """About the ordinary least squares of y on x."""
+    about_x, about_y = x - np.mean(x), y - np.mean(y)
+    spread = float(about_x @ about_x)
+    if not spread > 0:
+        return float("nan")
+    return float(np.std(about_y - float(about_x @ about_y) / spread * about_x, ddof=1))
+
+
 def _line(y: FloatArray, x: FloatArray, mast: FloatArray, lidar: FloatArray) -> DirectionFit:
     """Ordinary least squares of unwrapped directions y on x, and the error lidar - mast on the circle."""
     about_x, about_y = x - np.mean(x), y - np.mean(y)
@@ -310,4 +338,7 @@ def _line(y: FloatArray, x: FloatArray, mast: FloatArray, lidar: FloatArray) -> 
         residual_std_deg=float(np.std(residual, ddof=1)),
         bias_deg=bias,
         std_deg=float(np.sqrt(np.sum(np.square(difference_deg(error, bias))) / (len(error) - 1))),
+        residual_std_standard_error_deg=_jackknife_of(
+            _line_residual_std, y, x, min(_JACKKNIFE_BLOCKS, len(x))
+        ),
     )

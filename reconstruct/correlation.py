@@ -124,18 +124,33 @@ def isotropic(eddy_length_m: float) -> Correlation:
 
     def covariance(separation_m: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
         x, y, z = separation_m
-        square = x * x + y * y + z * z + _NEAR_ZERO
-        place = np.minimum(np.sqrt(np.sqrt(square)) * per_root_m, TABLE_POINTS - 1e-6)
+        # in place: fresh memory costs as much as the arithmetic
+        square = x * x
+        square += y * y
+        square += z * z
+        square += _NEAR_ZERO
+        place = np.sqrt(square)
+        place = np.minimum(per_root_m * np.sqrt(place), TABLE_POINTS - 1e-6)
         index = place.astype(np.intp)
         place -= index
-        along = (x * first[0] + y * first[1] + z * first[2]) * (x * second[0] + y * second[1] + z * second[2])
-        same = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
-        stretch = excess.take(index) + place * excess_step.take(index)
-        return np.asarray(
-            along / square * stretch + same * (lateral.take(index) + place * lateral_step.take(index))
-        )
+        along = _projected(x, y, z, first)
+        along *= along if second is first else _projected(x, y, z, second)
+        along /= square
+        stretch = excess_step.take(index)
+        stretch *= place
+        stretch += excess.take(index)
+        along *= stretch
+        place *= lateral_step.take(index)
+        place += lateral.take(index)
+        along += place * (first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
+        return np.asarray(along)
 
     return covariance
+
+
+def _projected(x: FloatArray, y: FloatArray, z: FloatArray, vector: FloatArray) -> FloatArray:
+    """Component along a vector."""
+    return np.asarray(x * vector[0] + y * vector[1] + z * vector[2])
 
 
 ROOT_STEPS = 256  # of the tables of the coherent model, along and across

@@ -86,7 +86,7 @@ def lag_covariances(
         where = np.flatnonzero((steps > 0) & (steps % each.passes == parity))
         if len(where):
             out[:, :, where] = _between(air, each, steps[where], rays.period_s)
-    return _variances(winds, turbulence)[:, None, None, None, None] * out
+    return np.asarray(_variances(winds, turbulence)[:, None, None, None, None] * out)
 
 
 def target_covariance(
@@ -130,7 +130,7 @@ def target_covariances(
     moved = each.moved_m(moments, 2 * each.passes * rays.count)
     values = pair_correlations(air, seen, Patches(still, along, still, seen.lidar), moved, to_point=True)
     out = np.moveaxis(values.reshape(len(moments), *shape), 0, 2)
-    return _variances(winds, turbulence)[:, None, None, None, None] * out
+    return np.asarray(_variances(winds, turbulence)[:, None, None, None, None] * out)
 
 
 def point_covariance(wind: WindState, turbulence: Turbulence, times_s: ArrayLike) -> FloatArray:
@@ -214,14 +214,15 @@ class _Passes(NamedTuple):
         carried = velocity[:, :, None, None]
         shape = (3, len(winds), len(times), rays.count)
         moved = way * turned[:, 2] - carried * rays.duration_s if sweep else np.zeros(shape)
-        parts = (turned[:, 0] - carried * times, np.broadcast_to(turned[:, 1], shape), moved)
+        centre, beams = turned[:, 0] - carried * times, np.broadcast_to(turned[:, 1], shape)
         lidar = np.tile(np.asarray(rays.lidar, dtype=np.intp), len(winds) * len(times))
-        return cls(Patches(*(part.reshape(3, -1) for part in parts), lidar), velocity, len(times))
+        patches = Patches(centre.reshape(3, -1), beams.reshape(3, -1), moved.reshape(3, -1), lidar)
+        return cls(patches, velocity, len(times))
 
     @property
     def scans(self) -> int:
         """Number of winds times passes."""
-        return self.passes * self.velocity_mps.shape[1]
+        return self.passes * int(self.velocity_mps.shape[1])
 
     def moved_m(self, times_s: FloatArray, pairs: int) -> FloatArray:
         """How far the air goes: (3, time, wind times pairs), or (3, time, 1) where all winds are alike."""
@@ -243,8 +244,8 @@ def _within(air: Air, each: _Passes) -> FloatArray:
     first, second = np.triu_indices(count, 1)
     if len(first):
         start = count * np.arange(each.scans)[:, None]
-        pairs = (each.patches.take((part + start).ravel()) for part in (first, second))
-        values = pair_correlations(air, *pairs, np.zeros((3, 1, 1))).reshape(each.scans, -1)
+        one, other = (each.patches.take((part + start).ravel()) for part in (first, second))
+        values = pair_correlations(air, one, other, np.zeros((3, 1, 1))).reshape(each.scans, -1)
         out[:, first, second] = values
         out[:, second, first] = values
     diagonal = np.arange(count)
@@ -259,7 +260,7 @@ def _between(air: Air, each: _Passes, steps: IntArray, period_s: float) -> Float
     later = place[:, (np.arange(each.passes) + steps[0]) % each.passes]
     shape = (*place.shape, count)
     first, second = np.broadcast_arrays(place[..., None], later[:, :, None])
-    moved = each.moved_m(period_s * steps, each.passes * count**2)
+    moved = each.moved_m(period_s * steps.astype(float), each.passes * count**2)
     patches = each.patches
     values = pair_correlations(air, patches.take(first.ravel()), patches.take(second.ravel()), moved)
     return np.moveaxis(values.reshape(len(steps), *shape), 0, 2)

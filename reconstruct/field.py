@@ -30,7 +30,7 @@ from reconstruct.waves import Waves, draw_waves, long_share, tensor_root
 
 MAX_CELLS = 20_000_000  # 320 MB of field and 720 MB while it is made
 CELLS_PER_LENGTH = 12  # at 170 m: cells of 14 m, a third of a 43 m probe; 11 % of the variance is smaller
-COARSEST_CELLS_PER_LENGTH = 5  # the box begins at 7.5 waves over 2 pi lengths: beyond that it would be empty
+COARSEST_CELLS_PER_LENGTH = 5  # the bell of the long waves ends at 15 / L, the box at 5 pi / L
 COARSEST_CELL_M = 40.0  # about a probe
 # From the last sample to the first in the next copy of the box, downwind, left, up: without its long waves the
 # box has forgotten itself by then.
@@ -139,7 +139,7 @@ def synthesise(
     --------
     >>> field = synthesise(Turbulence(0.1, 50.0), np.zeros(3), rng=np.random.default_rng(1))
     >>> field.cells.shape, field.waves.vector.shape
-    ((48, 48, 48, 4), (3, 1536))
+    ((48, 48, 48, 4), (3, 2048))
     """
     spacing = _spacing_m(turbulence.length_m, np.asarray(extent_m), spacing_m)
     counts = _counts(np.asarray(extent_m) + MARGIN_LENGTHS * turbulence.length_m, spacing)

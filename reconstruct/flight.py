@@ -19,6 +19,8 @@ from reconstruct.rays import Rays
 from reconstruct.waves import Waves
 from reconstruct.wind import WindState
 
+ComplexArray = NDArray[np.complex64]
+
 _CHUNK_POINTS = 1 << 17
 _BLOCK = 64  # times whose phases are a product of two shorter lists
 
@@ -168,15 +170,23 @@ def reach_m(rays: Rays, wind: WindState, duration_s: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class WaveSight:
-    """What a scan makes of the waves that a box cannot carry."""
+    """What consecutive scans make of the waves that a box cannot carry."""
 
-    seen: NDArray[np.float32]  # (pass, 4 wave, ray): real and imaginary parts by which `amplitudes` count
-    turning_per_s: FloatArray  # (wave,) phase that passes the target [rad/s]
-    period_s: float
+    seen: ComplexArray  # (pass, 2, wave, ray): by how much the two amplitudes of each wave count
+    phase: tuple[
+        ComplexArray, ...
+    ]  # a pass: (scan, wave) turned on by the air that passed since the first scan
 
     @classmethod
     def of(
-        cls, rays: Rays, wind: WindState, waves: Waves, draws: Draws, *, offset_m: ArrayLike = (0.0, 0.0, 0.0)
+        cls,
+        rays: Rays,
+        wind: WindState,
+        waves: Waves,
+        draws: Draws,
+        *,
+        scans: int,
+        offset_m: ArrayLike = (0.0, 0.0, 0.0),
     ) -> "WaveSight":
         """Work out what each ray of both directions of a scan leaves of each wave.
 
@@ -188,6 +198,8 @@ class WaveSight:
             From the field.
         draws : Draws
             What pointing and position do wrong, on average over the scans: a jitter is small beside the waves.
+        scans : int
+            Number of consecutive scans.
         offset_m : array_like
             (3,) place of the scan's target in the frame of the waves [m].
 
@@ -198,56 +210,57 @@ class WaveSight:
         x half the phase that the wave turns on that way.
         """
         steady = draws.mean()
-        middle = Sampling(probe_points=1, sweep_points=1)
-        sight = _sight(rays, wind, steady, np.arange(2), middle)
+        sight = _sight(rays, wind, steady, np.arange(2), Sampling(probe_points=1, sweep_points=1))
         when = np.stack([rays.time_s, rays.reversed_time_s]) + steady.delay_s
         passes = 1 + rays.back_and_forth
-        velocity = carried_mps(wind)
-        seen = np.empty((passes, 4 * waves.vector.shape[1], rays.count), dtype=np.float32)
+        seen = np.empty((passes, 2, waves.vector.shape[1], rays.count), dtype=np.complex64)
         for index in range(passes):
             beam = sight.beam[index, :, 0]
-            place = sight.points_m[index, :, 0, 0] + np.asarray(offset_m) - when[index, :, None] * velocity
+            place = sight.points_m[index, :, 0, 0] + np.asarray(offset_m)
+            place = place - when[index, :, None] * carried_mps(wind)
             way = _way_m(rays, wind, beam, reverse=index == 1)
-            along = waves.vector.T @ beam.T
-            kept = np.sinc(waves.vector.T @ way.T / (2 * np.pi))
-            for lidar, probe in enumerate(rays.probes):
-                kept[:, rays.lidar == lidar] *= probe.transfer(along[:, rays.lidar == lidar])
-            phase = kept * np.exp(1j * (waves.vector.T @ place.T))
-            one, other = (root.T @ beam.T * phase for root in (waves.first, waves.second))
-            seen[index] = np.concatenate([one.real, one.imag, other.real, other.imag])
-        return cls(seen, velocity @ waves.vector, rays.period_s)
+            kept = _kept(rays, waves, beam, way) * np.exp(1j * (waves.vector.T @ place.T))
+            seen[index] = waves.first.T @ beam.T * kept, waves.second.T @ beam.T * kept
+        period_s = rays.period_s
+        phase = [
+            passing(wind, waves, period_s * index, period_s * passes, len(range(index, scans, passes)))
+            for index in range(passes)
+        ]
+        return cls(seen, tuple(phase))
 
-    def radial_speed(self, amplitudes: FloatArray, scans: int) -> FloatArray:
-        """(scan, ray) sum of the waves, for a standard deviation of 1, in consecutive scans."""
+    def radial_speed(self, amplitudes: ComplexArray) -> FloatArray:
+        """(scan, ray) sum of the waves, for a standard deviation of 1."""
         passes = len(self.seen)
-        out = np.empty((scans, self.seen.shape[2]))
+        out = np.empty((sum(len(phase) for phase in self.phase), self.seen.shape[3]))
         for index in range(passes):
-            first_s, step_s = self.period_s * index, self.period_s * passes
-            count = len(range(index, scans, passes))
-            turned = _turned(amplitudes, self.turning_per_s, first_s, step_s, count)
-            out[index::passes] = turned.reshape(count, -1) @ self.seen[index]
+            each = np.einsum("aw,awr->wr", amplitudes, self.seen[index])
+            out[index::passes] = (self.phase[index] @ each).real
         return out
 
 
-def met_waves(
-    wind: WindState, waves: Waves, amplitudes: FloatArray, *, first_s: float, step_s: float, count: int
-) -> FloatArray:
-    """Sum of the waves (time, 3) at the target at equal steps of time, for a standard deviation of 1."""
-    turned = _turned(amplitudes, carried_mps(wind) @ waves.vector, first_s, step_s, count)
-    return np.asarray(turned[:, 0] @ waves.first.T + turned[:, 2] @ waves.second.T)
-
-
-def _turned(
-    amplitudes: FloatArray, turning_per_s: FloatArray, first_s: float, step_s: float, count: int
-) -> NDArray[np.float32]:
-    """(time, 4, wave) factors of the four parts of each wave: amplitudes, turned on by the passing air."""
+def passing(wind: WindState, waves: Waves, first_s: float, step_s: float, count: int) -> ComplexArray:
+    """Phase (time, wave) by which the air that passes turns each wave, at equal steps of time."""
+    turning = carried_mps(wind) @ waves.vector
     late, early = np.arange(0, count, _BLOCK), np.arange(min(_BLOCK, count))
-    starts = np.exp(-1j * np.outer(first_s + step_s * late, turning_per_s)).astype(np.complex64)
-    steps = np.exp(-1j * np.outer(step_s * early, turning_per_s)).astype(np.complex64)
-    phase = (starts[:, None] * steps).reshape(-1, len(turning_per_s))[:count]
-    both = amplitudes.astype(np.float32)
-    one, other = (phase * (part[0] + 1j * part[1]) for part in both)
-    return np.stack([one.real, -one.imag, other.real, -other.imag], axis=1)
+    starts = np.exp(-1j * np.outer(first_s + step_s * late, turning)).astype(np.complex64)
+    steps = np.exp(-1j * np.outer(step_s * early, turning)).astype(np.complex64)
+    return np.asarray((starts[:, None] * steps).reshape(-1, len(turning))[:count])
+
+
+def met_waves(waves: Waves, amplitudes: ComplexArray, phase: ComplexArray) -> FloatArray:
+    """Sum of the waves (time, 3) at the target, for a standard deviation of 1; `phase` from `passing`."""
+    each = amplitudes[0] * waves.first + amplitudes[1] * waves.second
+    return np.asarray((phase @ each.T.astype(np.complex64)).real)
+
+
+def _kept(rays: Rays, waves: Waves, beam: FloatArray, way_m: FloatArray) -> FloatArray:
+    """(wave, ray) share of each wave's amplitude that probe and way leave."""
+    along = waves.vector.T @ beam.T
+    kept = np.asarray(np.sinc(waves.vector.T @ way_m.T / (2 * np.pi)))
+    for lidar, probe in enumerate(rays.probes):
+        own = rays.lidar == lidar
+        kept[:, own] *= probe.transfer(along[:, own])
+    return kept
 
 
 def _way_m(rays: Rays, wind: WindState, beam: FloatArray, *, reverse: bool) -> FloatArray:

@@ -103,9 +103,12 @@ def _moments(wind: FloatArray, error: FloatArray, covariance: FloatArray) -> Flo
     """(4, state) moments; the frame is turned to the principal axes of the error, longest first."""
     variances, axes = np.linalg.eigh(covariance)
     std = np.sqrt(np.clip(variances[:, ::-1], 0.0, None))
-    axes = axes[:, :, ::-1] * np.stack([np.ones(len(wind)), np.linalg.det(axes[:, :, ::-1])], -1)[:, None, :]
+    longest = axes[:, :, 1]
+    axes = np.stack([longest, np.stack([-longest[:, 1], longest[:, 0]], axis=-1)], axis=-1)  # right-handed
     truth, mean = (np.einsum("sij,si->sj", axes, a) for a in (wind, wind + error))
     narrow = std[:, 0] <= NARROW * np.hypot(*mean.T)
+    if np.all(narrow):
+        return _narrow(truth, mean, std)
     out = np.empty((4, len(wind)))
     for method, where in ((_narrow, narrow), (_wide, ~narrow)):
         if np.any(where):

@@ -19,10 +19,12 @@ from reconstruct import retrieval
 from reconstruct.error_draws import Draws, Sources, draw_pointing, draw_speed_errors
 from reconstruct.field import Field, synthesise
 from reconstruct.flight import (
+    ComplexArray,
     Sampling,
     WaveSight,
     is_uniform,
     met_waves,
+    passing,
     radial_speed_mps,
     reach_m,
     reference_mps,
@@ -34,6 +36,7 @@ from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.uncertainty import ErrorSources
 from reconstruct.verdict import Simulation
+from reconstruct.waves import Waves
 from reconstruct.wind import WindState, uv_mps
 
 Progress = Callable[[float], None]
@@ -284,7 +287,9 @@ def fly_through(
     scans = scans_in(rays, settings.averaging_s)
     rows = ray_rows(rays)
     found, met = [], []
-    planned = WaveSight.of(rays, wind, air.field.waves, Draws.none(rays))
+    waves = air.field.waves
+    planned = WaveSight.of(rays, wind, waves, Draws.none(rays), scans=scans)
+    phase = reference_phase(wind, waves, settings.averaging_s)
     for shift in shifts_m:
         draws = draw_pointing(sources, rays, (1, scans), rng).realisation(0)
         clean = radial_speed_mps(
@@ -297,12 +302,12 @@ def fly_through(
             std_mps=air.std_mps,
             shift_m=shift,
         )
-        amplitudes = air.field.waves.amplitudes(rng)
-        sight = WaveSight.of(rays, wind, air.field.waves, draws) if draws.any else planned
-        clean += air.std_mps * sight.radial_speed(amplitudes, scans)
+        amplitudes = waves.amplitudes(rng)
+        sight = WaveSight.of(rays, wind, waves, draws, scans=scans) if draws.any else planned
+        clean += air.std_mps * sight.radial_speed(amplitudes)
         fit = retrieval.solve(rows, _measured(clean, sources, rays, (1, scans), rng)[0])
         found.append(fit.wind_mps[..., :2])
-        met.append(reference_uv_mps(wind, air, shift, amplitudes, settings.averaging_s))
+        met.append(reference_uv_mps(wind, air, shift, amplitudes, phase))
     return Simulation(
         wind,
         np.stack(found),
@@ -312,20 +317,19 @@ def fly_through(
     )
 
 
+def reference_phase(wind: WindState, waves: Waves, averaging_s: float) -> ComplexArray:
+    """Phase (sample, wave) of the waves at the target, `REFERENCE_INTERVAL_S` apart."""
+    count = int(averaging_s / REFERENCE_INTERVAL_S)
+    return passing(wind, waves, 0.5 * REFERENCE_INTERVAL_S, REFERENCE_INTERVAL_S, count)
+
+
 def reference_uv_mps(
-    wind: WindState, air: Air, shift_m: FloatArray, amplitudes: FloatArray, averaging_s: float
+    wind: WindState, air: Air, shift_m: FloatArray, amplitudes: ComplexArray, phase: ComplexArray
 ) -> FloatArray:
-    """Eastward and northward wind (sample, 2) of an instrument at the target, `REFERENCE_INTERVAL_S` apart [m/s]."""
-    times = np.arange(0.5 * REFERENCE_INTERVAL_S, averaging_s, REFERENCE_INTERVAL_S)
+    """Eastward and northward wind (sample, 2) of an instrument at the target [m/s]; `phase` from `reference_phase`."""
+    times = np.asarray(REFERENCE_INTERVAL_S * (np.arange(len(phase)) + 0.5), dtype=float)
     met = reference_mps(wind, times, field=air.field, std_mps=air.std_mps, shift_m=shift_m)
-    met = met + air.std_mps * met_waves(
-        wind,
-        air.field.waves,
-        amplitudes,
-        first_s=0.5 * REFERENCE_INTERVAL_S,
-        step_s=REFERENCE_INTERVAL_S,
-        count=len(times),
-    )
+    met = met + air.std_mps * met_waves(air.field.waves, amplitudes, phase)
     downwind = np.stack(uv_mps(1.0, wind.from_deg))
     left = np.array([-downwind[1], downwind[0]])
     return np.asarray(met[:, :1] * downwind + met[:, 1:2] * left)

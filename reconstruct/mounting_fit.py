@@ -138,6 +138,8 @@ def fit_mounting(
         if _chance(chi_square, freedom) > OUTLIER_CHANCE:
             break
         kept.remove(_worst(sightings, kept, start, solve, head_std_m))
+        if 2 * len(kept) <= len(sightings):
+            raise _contradiction(sightings, list(range(len(sightings))), "no majority of them agrees")
     mounting = replace(start, **dict(zip(solve, values.tolist(), strict=True)))
     offset_m, range_std_m = _range_offset(sightings, kept, head_std_m, start.range_offset_m)
     mounting = replace(mounting, range_offset_m=offset_m)
@@ -231,15 +233,21 @@ def _worst(
             chi_square = _solved(sightings, others, start, solve, head_std_m)[2]
             agreed.append((_chance(chi_square, freedom), number))
     agreed.sort(reverse=True)
-    named = ", ".join(sightings[number].name for number in kept)
     clear = [number for chance, number in agreed if chance > OUTLIER_CHANCE]
     if not agreed or len(clear) > 1:
-        which = ", ".join(sightings[number].name for number in clear) or "which one cannot be told"
-        raise InputError(
-            f"the hard targets {named} contradict each other beyond their uncertainties, and one of them is "
-            f"wrong ({which}). Check positions and maps, or add a target"
+        which = " or ".join(sightings[number].name for number in clear)
+        raise _contradiction(
+            sightings, kept, f"one of them is wrong: {which}" if which else "which is wrong cannot be told"
         )
     return agreed[0][1]
+
+
+def _contradiction(sightings: Sequence[Sighting], kept: list[int], verdict: str) -> InputError:
+    named = ", ".join(sightings[number].name for number in kept)
+    return InputError(
+        f"the hard targets {named} contradict each other beyond their uncertainties, and {verdict}. Check positions "
+        "and maps, or add a target"
+    )
 
 
 def _range_offset(

@@ -6,13 +6,14 @@ sweeps, of a correlation that has a cusp, 1 - C r^(2/3), where two places coinci
 depends on how far the patches are from each other: patches that overlap need nodes that crowd at the cusp.
 """
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
+from functools import lru_cache, partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.gates import Probe
 from reconstruct.correlation import Correlation, correlation
 from reconstruct.spectra import Turbulence
@@ -29,7 +30,9 @@ FIRST_NODES, SECOND_NODES = (2, 2), (3, 2)
 # crossing beams retrieve differences of their covariances, enlarged by one over the sine of the crossing
 # angle squared.
 OVERLAP_SPREADS = 1.0
-OVERLAP_NODES = (10, 8)  # on each side, along the first and the second beam: right to 7e-5 of the variance
+# Their number on each side, along the first and the second beam: right to 1e-4 of the variance, and 7e-5 for
+# lidars that cross.
+OVERLAP_NODES, CROSSING_OVERLAP_NODES = (8, 6), (10, 8)
 SHALLOW = 0.05  # sine squared of the crossing angle under which two beams are as near all along a probe
 PULSE_REACH = 3.5  # standard deviations of the pulse beyond the window, where the probe ends
 # Probe and sweep of a ray with itself, graded towards no offset: to 1e-3 of the variance, and 1e-4 for
@@ -39,10 +42,9 @@ SELF_NODES, CROSSING_SELF_NODES = (8, 5), (16, 8)
 # (von Karman: exp(-9)): what a patch of size A leaves then falls like length over A, as it has to.
 SELF_LENGTHS = {"von-karman": 12.0, "kaimal": 25.0, "mann": 30.0}
 OVERLAP_REACH = 4.0  # standard deviations beyond the windows, where the offset of two places in a probe ends
+TABLE_STEPS = 2**12  # of the weighting of a probe, from its middle to its end
 CHUNK_PLACES = 2**13  # correlations evaluated at once: their arrays stay in the processor's cache
 _FINE_PLACES = FIRST_NODES[0] * FIRST_NODES[1] * SECOND_NODES[0] * SECOND_NODES[1]
-_POINT_PLACES = 2 * OVERLAP_NODES[0] * 2
-_OVERLAP_PLACES = 2 * OVERLAP_NODES[1] * 2 * _POINT_PLACES
 _UNIT_STD = np.sqrt(1.0 / 12.0)  # of a uniform variable of width 1
 # Two places for each of four offsets (two probes, two sweeps) from the middle: eight of the sixteen corners,
 # exact to third degree; and four for a probe and a sweep against a point.
@@ -52,17 +54,11 @@ _POINT_CORNERS = np.array([[1.0, a, b] for a in _SIDES for b in _SIDES])
 
 
 class Footprint(NamedTuple):
-    """What a ray covers around the middle of its patch; components first."""
+    """What rays of one probe cover around the middles of their patches; components first."""
 
     beam: FloatArray  # (3, ray) unit vector of the beam
     sweep_m: FloatArray  # (3, ray) from the start of the ray to its end
-    lidar: IntArray  # (ray,)
-
-    def take(self, index: IntArray) -> "Footprint":
-        """Footprints of some rays, in that order."""
-        return Footprint(
-            self.beam.take(index, axis=1), self.sweep_m.take(index, axis=1), self.lidar.take(index)
-        )
+    probe: Probe
 
 
 class Patches(NamedTuple):
@@ -73,14 +69,18 @@ class Patches(NamedTuple):
     sweep_m: FloatArray  # (3, ray) from the start of the ray to its end
     lidar: IntArray  # (ray,)
 
-    @property
-    def footprint(self) -> Footprint:
-        """The patches without their places."""
-        return Footprint(self.beam, self.sweep_m, self.lidar)
-
     def take(self, index: IntArray) -> "Patches":
         """Patches of some rays, in that order."""
-        return Patches(self.centre_m.take(index, axis=1), *self.footprint.take(index))
+        return Patches(
+            self.centre_m.take(index, axis=1),
+            self.beam.take(index, axis=1),
+            self.sweep_m.take(index, axis=1),
+            self.lidar.take(index),
+        )
+
+    def footprint(self, index: IntArray, probe: Probe) -> Footprint:
+        """Footprints of some rays, in that order, which have one probe."""
+        return Footprint(self.beam.take(index, axis=1), self.sweep_m.take(index, axis=1), probe)
 
 
 class Air(NamedTuple):
@@ -116,28 +116,42 @@ def pair_correlations(
     overlapping = near if len(air.probes) > 1 else square < (OVERLAP_SPREADS * spread) ** 2
     distant = ~near & (square > air.distant_m**2)
     out = np.empty(near.shape)
-    ours, theirs = first.footprint, second.footprint
     flat, whole = apart.reshape(3, -1), out.reshape(-1)
+    nodes = OVERLAP_NODES if len(air.probes) == 1 else CROSSING_OVERLAP_NODES
     for mask, rule, places in (
-        (overlapping, _overlapping, _POINT_PLACES if to_point else _OVERLAP_PLACES),
+        (overlapping, partial(_overlapping, nodes), 4 * nodes[0] * (1 if to_point else 4 * nodes[1])),
         (near & ~overlapping, _fine, _FINE_PLACES),
         (~(near | distant), _coarse, len(_CORNERS)),
         (distant, _single, 1),
     ):
-        where = np.flatnonzero(mask)
-        step = max(1, CHUNK_PLACES // places)
-        for start in range(0, len(where), step):
-            part = where[start : start + step]
+        for part, (one, other) in _parts(air.probes, first, second, mask, CHUNK_PLACES // places):
             pair = part % mask.shape[1]
-            distance = flat.take(part, axis=1)
-            whole[part] = rule(air, ours.take(pair), theirs.take(pair), distance, to_point)
+            ours, theirs = first.footprint(pair, one), second.footprint(pair, other)
+            whole[part] = rule(air.tensor, ours, theirs, flat.take(part, axis=1), to_point)
     return out
 
 
-def _single(air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool) -> FloatArray:
+def _parts(
+    probes: tuple[Probe, ...], first: Patches, second: Patches, mask: BoolArray, most: int
+) -> Iterator[tuple[IntArray, tuple[Probe, Probe]]]:
+    """Places in a mask (lag, pair), counted through, that share both probes, at most so many; and these."""
+    where = np.flatnonzero(mask)
+    kinds = [where]
+    if len(probes) > 1:
+        pair = where % mask.shape[1]
+        kind = len(probes) * first.lidar[pair] + second.lidar[pair]
+        kinds = [where[kind == number] for number in range(len(probes) ** 2)]
+    for both, places in zip(product(probes, probes), kinds, strict=True):
+        for start in range(0, len(places), max(1, most)):
+            yield places[start : start + max(1, most)], both
+
+
+def _single(
+    tensor: Correlation, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool
+) -> FloatArray:
     """Correlation of the middles of two patches."""
     del to_point  # a point has no other middle
-    return air.tensor(apart_m, first.beam, second.beam)
+    return tensor(apart_m, first.beam, second.beam)
 
 
 def _spread(probes: Sequence[Probe], first: Patches, second: Patches, to_point: bool) -> FloatArray:
@@ -149,57 +163,67 @@ def _spread(probes: Sequence[Probe], first: Patches, second: Patches, to_point: 
     return np.asarray(np.sqrt(square))
 
 
-def _coarse(air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool) -> FloatArray:
+def _coarse(
+    tensor: Correlation, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool
+) -> FloatArray:
     """Average over two patches that are far from each other: right to the third degree in the offsets."""
-    std = np.array([probe.std_m for probe in air.probes])
-    sides = [apart_m, first.beam * std[first.lidar], first.sweep_m * _UNIT_STD]
+    sides = [apart_m, first.beam * first.probe.std_m, first.sweep_m * _UNIT_STD]
     if not to_point:
-        sides += [second.beam * std[second.lidar], second.sweep_m * _UNIT_STD]
+        sides += [second.beam * second.probe.std_m, second.sweep_m * _UNIT_STD]
     corners = _POINT_CORNERS if to_point else _CORNERS
     places = corners @ np.stack(sides, axis=1)  # (3, corner, pair)
-    values = air.tensor(places, first.beam[:, None], second.beam[:, None])
+    values = tensor(places, first.beam[:, None], second.beam[:, None])
     return np.asarray(np.add.reduce(values, axis=0) / len(corners))
 
 
-def _fine(air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool) -> FloatArray:
+def _fine(
+    tensor: Correlation, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool
+) -> FloatArray:
     """Average over two patches that are near each other or overlap, by unequal Gauss rules."""
-    one, weight_one = _places(air.probes, first, FIRST_NODES)
+    one, weight = _patch_rule(first.probe, FIRST_NODES)
+    places = apart_m[:, None] + one @ np.stack([first.beam, first.sweep_m], axis=1)
     if to_point:
-        values = air.tensor(apart_m[:, None] + one, first.beam[:, None], second.beam[:, None])
-        return np.asarray(np.einsum("ap,ap->p", weight_one, values))
-    two, weight_two = _places(air.probes, second, SECOND_NODES)
-    places = apart_m[:, None, None] + one[:, :, None] - two[:, None]
-    values = air.tensor(places, first.beam[:, None, None], second.beam[:, None, None])
-    return np.asarray(np.einsum("ap,bp,abp->p", weight_one, weight_two, values))
+        return np.asarray(weight @ tensor(places, first.beam[:, None], second.beam[:, None]))
+    two, weight_two = _patch_rule(second.probe, SECOND_NODES)
+    late = two @ np.stack([second.beam, second.sweep_m], axis=1)
+    both = places[:, :, None] - late[:, None]
+    values = tensor(both, first.beam[:, None, None], second.beam[:, None, None])
+    return np.asarray(np.outer(weight, weight_two).ravel() @ values.reshape(-1, apart_m.shape[1]))
+
+
+@lru_cache(maxsize=64)
+def _patch_rule(probe: Probe, counts: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+    """Gauss rule over a patch: (node, 2) offsets along the beam [m] and parts of the sweep, weights (node,)."""
+    offset, weight = probe.nodes(counts[0])
+    turn, share = _legendre(counts[1])
+    along, across = (part.ravel() for part in np.meshgrid(offset, 0.5 * turn, indexing="ij"))
+    return np.stack([along, across], axis=1), np.outer(weight, 0.5 * share).ravel()
 
 
 def _overlapping(
-    air: Air, first: Footprint, second: Footprint, apart_m: FloatArray, to_point: bool
+    nodes: tuple[int, int],
+    tensor: Correlation,
+    first: Footprint,
+    second: Footprint,
+    apart_m: FloatArray,
+    to_point: bool,
 ) -> FloatArray:
     """Average over two patches that overlap: along the first beam, nodes crowd where the second place is
     nearest; along the second, they part where the two beams are nearest.
     """
-    out = np.empty(apart_m.shape[1])
-    kinds = len(air.probes) * first.lidar + second.lidar
-    for kind in np.unique(kinds):
-        where = np.flatnonzero(kinds == kind)
-        probes = [air.probes[lidar] for lidar in divmod(int(kind), len(air.probes))]
-        one, two = first.take(where), second.take(where)
-        swept, share = _between_sweeps(one, two, apart_m[:, where], to_point)
-        if to_point:
-            beside, weight = swept[:, None], share[None]
-        else:
-            along, beside_weight = _split(
-                _nearest_of_second(one, two, swept), probes[1], _graded(OVERLAP_NODES[1], 1)
-            )
-            beside, weight = swept[:, None] - along * two.beam[:, None, None], beside_weight * share
-        nearest = -np.einsum("cotp,cp->otp", beside, one.beam)
-        along, inner = _split(nearest, probes[0], _graded(OVERLAP_NODES[0], 2))
-        places = beside[:, None] + along * one.beam[:, None, None, None]
-        values = air.tensor(places, one.beam[:, None, None, None], two.beam[:, None, None, None])
-        weight = inner * weight
-        out[where] = np.einsum("iotp,iotp->p", values, weight) / np.einsum("iotp->p", weight)
-    return out
+    swept, share = _between_sweeps(first, second, apart_m, to_point)
+    if to_point:
+        beside, weight = swept[:, None], share[None]
+    else:
+        nearest = _nearest_of_second(first, second, swept)
+        along, beside_weight = _split(nearest, second.probe, _graded(nodes[1], 1))
+        beside, weight = swept[:, None] - along * second.beam[:, None, None], beside_weight * share
+    nearest = -np.einsum("cotp,cp->otp", beside, first.beam)
+    along, inner = _split(nearest, first.probe, _graded(nodes[0], 2))
+    places = beside[:, None] + along * first.beam[:, None, None, None]
+    values = tensor(places, first.beam[:, None, None, None], second.beam[:, None, None, None])
+    inner *= weight
+    return np.asarray(np.einsum("iotp,iotp->p", values, inner) / np.einsum("iotp->p", inner))
 
 
 def _between_sweeps(
@@ -239,21 +263,23 @@ def _split(
     node, weight = (values.reshape(-1, *(1,) * part.ndim) for values in rule)
     below, above = part + reach, reach - part
     offset = np.concatenate([part - below * node, part + above * node])
-    return offset, np.concatenate([below * weight, above * weight]) * probe.weight(offset)
+    return offset, np.concatenate([below * weight, above * weight]) * _probe_weight(probe, offset)
 
 
-def _places(
-    probes: Sequence[Probe], patches: Footprint, counts: tuple[int, int]
-) -> tuple[FloatArray, FloatArray]:
-    """Offsets (3, node, ray) and weights (node, ray) of a Gauss rule over each patch."""
-    rules = [probe.nodes(counts[0]) for probe in probes]
-    offset = np.stack([rule[0] for rule in rules])[patches.lidar].T
-    weight = np.stack([rule[1] for rule in rules])[patches.lidar].T
-    turn, share = _legendre(counts[1])
-    along = np.repeat(offset, counts[1], axis=0)
-    across = np.tile(0.5 * turn, counts[0])[:, None]
-    places = along * patches.beam[:, None] + across * patches.sweep_m[:, None]
-    return places, np.repeat(weight, counts[1], axis=0) * np.tile(0.5 * share, counts[0])[:, None]
+def _probe_weight(probe: Probe, offset_m: FloatArray) -> FloatArray:
+    """Weight of the air at places in the probe [1/m], from a table: right to 1e-6 of that in the middle."""
+    per_m, weight, step = _probe_table(probe)
+    place = np.minimum(np.abs(offset_m) * per_m, len(weight) - 1e-6)
+    index = place.astype(np.intp)
+    return np.asarray(weight.take(index) + (place - index) * step.take(index))
+
+
+@lru_cache(maxsize=64)
+def _probe_table(probe: Probe) -> tuple[float, FloatArray, FloatArray]:
+    """Steps per metre, the weight at each, and what it grows by to the next."""
+    reach = 0.5 * probe.window_m + (PULSE_REACH + 1) * probe.pulse_std_m
+    weight = probe.weight(np.linspace(0.0, reach, TABLE_STEPS + 1))
+    return TABLE_STEPS / reach, weight[:-1], np.diff(weight)
 
 
 def self_correlations(air: Air, patches: Patches) -> FloatArray:
@@ -269,10 +295,10 @@ def self_correlations(air: Air, patches: Patches) -> FloatArray:
     for lidar, probe in enumerate(air.probes):
         mine = np.flatnonzero(patches.lidar == lidar)
         along, along_weight = _along_self(probe, counts[0], air.self_m, beside[mine])
-        beam, sweep = patches.beam[:, mine], patches.sweep_m[:, mine]
-        places = (along * beam[:, None])[:, :, None] + (part[:, mine] * sweep[:, None])[:, None]
-        values = air.tensor(places, beam[:, None, None], beam[:, None, None])
-        out[mine] = np.einsum("ap,bp,abp->p", along_weight, weight[:, mine], values)
+        beam, sweep = patches.beam[:, None, None, mine], patches.sweep_m[:, None, None, mine]
+        places = along[:, None] * beam + part[:, mine] * sweep
+        values = air.tensor(places, beam, beam)
+        out[mine] = np.einsum("ap,ap->p", along_weight, np.einsum("bp,abp->ap", weight[:, mine], values))
     return out
 
 

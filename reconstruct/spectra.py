@@ -31,8 +31,8 @@ EDDY_LENGTH_RATIO: float = math.gamma(1 / 3) / (math.sqrt(math.pi) * math.gamma(
 # Kaimal length over the von Kármán L of equal inertial subrange: 4 L/(6 L)^(5/3) against 4 L/(70.8
 # L^2)^(5/6).
 KAIMAL_LENGTH_RATIO: float = ((2 * math.pi * EDDY_LENGTH_RATIO) ** (5 / 3) / 6 ** (5 / 3)) ** 1.5
-MANN_GAMMA = 3.9  # shear distortion parameter, IEC 61400-1 ed. 4, Annex C
-KAIMAL_STD_RATIO = (1.0, 0.8, 0.5)  # of u, v, w to u: IEC 61400-1 ed. 4, Annex C.3
+MANN_GAMMA = 3.9  # shear distortion parameter, IEC 61400-1 ed. 4, Annex C.2, eq. C.12
+KAIMAL_STD_RATIO = (1.0, 0.8, 0.5)  # of u, v, w to u: IEC 61400-1 ed. 4, Annex C.3, Table C.1
 KAIMAL_LENGTH_FACTOR = (1.0, 2.7 / 8.1, 0.66 / 8.1)  # same table: 8.1, 2.7 and 0.66 times the scale parameter
 COHERENCE_DECAY = 12.0  # IEC 61400-1 ed. 4, Annex C.3
 COHERENCE_OFFSET = 0.12
@@ -141,8 +141,8 @@ def iec_turbulence(
 
     Notes
     -----
-    IEC 61400-1 ed. 4: sigma_1 = I_ref (0.75 V + 5.6 m/s) (normal turbulence model); scale parameter
-    0.7 z up to 60 m, then 42 m; Kaimal length 8.1 times it (Annex C.3).
+    IEC 61400-1 ed. 4: sigma_1 = I_ref (0.75 V + 5.6 m/s) (normal turbulence model, eq. 10); scale parameter
+    0.7 z up to 60 m, then 42 m (eq. 5); Kaimal length 8.1 times it (Table C.1).
 
     Examples
     --------

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.duck import bounded_duck
 from reconstruct.losses import Loss, merged_losses
@@ -302,25 +302,22 @@ def _read(
     ).fetchnumpy()
     quantities = [name for name in GATE_FIELDS if name in fields]
     values: dict[str, Any] = connection.execute(
-        f"SELECT ray, gate, {', '.join(quantities)} FROM value {within} {chosen}", where
-    ).fetchnumpy()
-    cell = (values["ray"] - start) * len(ranges) + (values["gate"] if range_m is None else 0)
+        f"SELECT {', '.join(quantities)} FROM value {within} {chosen}", where
+    ).fetchnumpy()  # in the order in which they were inserted, which DuckDB keeps: by ray and gate
     shape = (stop - start, len(ranges))
-    grids: dict[str, Any] = {name: _grid(values[name], cell, shape) for name in quantities}
+    grids: dict[str, Any] = {name: _grid(values[name], shape, block) for name in quantities}
     rays: dict[str, Any] = {
         name: column if name in _WHOLE else np.ma.filled(column, np.nan) for name, column in table.items()
     }
     notes, losses = _told(connection, block.number)
-    return Records(
-        range_m=ranges, instrument=block.instrument, notes=notes, losses=losses, **rays, **grids
-    )
+    return Records(range_m=ranges, instrument=block.instrument, notes=notes, losses=losses, **rays, **grids)
 
 
-def _grid(values: FloatArray, cell: IntArray, shape: tuple[int, int]) -> FloatArray:
-    """Values in their cells; as they come where the store gives them in order, as it nearly always does."""
-    values = np.ma.filled(values, np.nan)  # DuckDB takes the NaN of a data frame for NULL
-    if len(values) == shape[0] * shape[1] and bool(np.all(cell[1:] > cell[:-1])):
-        return values.reshape(shape)
-    out = np.full(shape[0] * shape[1], np.nan)
-    out[cell] = values
-    return out.reshape(shape)
+def _grid(values: FloatArray, shape: tuple[int, int], block: Block) -> FloatArray:
+    """(ray, gate) of values in their order; DuckDB takes the NaN of a data frame for NULL."""
+    if len(values) != shape[0] * shape[1]:
+        raise InputError(
+            f"the store holds {len(values)} values of {block.instrument or 'an instrument'} where {shape[0]} rays of "
+            f"{shape[1]} gates need {shape[0] * shape[1]}: it is damaged, write it again"
+        )
+    return np.ma.filled(values, np.nan).reshape(shape)

@@ -6,6 +6,7 @@ matrix of the same fit: P = G (C_sources + C_turbulence) Gᵀ. At intensity 0 th
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -133,7 +134,8 @@ def predict_turbulent(
     )
     if reference == "vector" or whole.speed_bias_mps is None:
         return whole
-    return replace(whole, speed_bias_mps=whole.speed_bias_mps - scalar_excess_mps(wind, turbulence))
+    excess_mps = _scalar_excess_mps(wind.speed_mps, turbulence)
+    return replace(whole, speed_bias_mps=whole.speed_bias_mps - excess_mps)
 
 
 def _clocks(rays: Rays, sources: ErrorSources | Sequence[ErrorSources] | None) -> list[Rays]:
@@ -156,9 +158,15 @@ def scalar_excess_mps(wind: WindState, turbulence: Turbulence) -> float:
     >>> round(scalar_excess_mps(WindState(8.0, 0.0), Turbulence(0.09, 170.0)), 3)
     0.032
     """
-    variance = point_covariance(wind, turbulence, 0.0)[0]
-    speed = expand(np.array([wind.speed_mps, 0.0]), np.diag(variance))
-    return float(speed.mean_mps) - wind.speed_mps
+    return _scalar_excess_mps(wind.speed_mps, turbulence)
+
+
+@lru_cache(maxsize=1024)
+def _scalar_excess_mps(speed_mps: float, turbulence: Turbulence) -> float:
+    """Kept, since all directions and sector sizes share it."""
+    variance = point_covariance(WindState(speed_mps, 0.0), turbulence, 0.0)[0]
+    speed = expand(np.array([speed_mps, 0.0]), np.diag(variance))
+    return float(speed.mean_mps) - speed_mps
 
 
 def with_ten_minute(prediction: ScanPrediction, mean: TenMinute) -> ScanPrediction:

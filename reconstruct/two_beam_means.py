@@ -80,8 +80,45 @@ def two_beam_means(
     )
     both = [_means(speed, place, len(number)) for speed in (left_mps, right_mps)]
     count, mean = np.stack([part[0] for part in both], axis=-1), np.stack([part[1] for part in both], axis=-1)
+    ends = ((number + 1) * length).astype("datetime64[ns]")
+    return trusted_means(
+        ends,
+        count,
+        mean,
+        half_angle_deg=half_angle_deg,
+        elevation_deg=elevation_deg,
+        least_samples=least_samples,
+        least_speed_mps=least_speed_mps,
+        largest_angle_deg=largest_angle_deg,
+    )
+
+
+def trusted_means(
+    time_utc: TimeArray,
+    count: IntArray,
+    mean: FloatArray,
+    *,
+    half_angle_deg: float,
+    elevation_deg: float = 0.0,
+    least_samples: int = LEAST_SAMPLES,
+    least_speed_mps: float = LEAST_SPEED_MPS,
+    largest_angle_deg: float = LARGEST_ANGLE_DEG,
+) -> TwoBeamMeans:
+    """Winds of the periods whose beams pass every rule, from the means of each beam.
+
+    Parameters
+    ----------
+    time_utc : numpy.ndarray of datetime64
+        (period,) ends.
+    count : numpy.ndarray
+        (period, 2) good samples of the left and the right beam.
+    mean : numpy.ndarray
+        (period, 2) mean radial speeds, positive away [m/s]; NaN where there is no sample.
+    half_angle_deg, elevation_deg, least_samples, least_speed_mps, largest_angle_deg
+        As for `two_beam_means`.
+    """
     wind = two_beam_wind(mean[:, 0], mean[:, 1], half_angle_deg=half_angle_deg, elevation_deg=elevation_deg)
-    kept, steps = np.ones(len(number), dtype=bool), []
+    kept, steps = np.ones(len(time_utc), dtype=bool), []
     rules = (
         ("samples on both beams", np.all(count >= least_samples, axis=1)),
         ("radial speed of both beams", np.all(np.abs(mean) > least_speed_mps, axis=1)),
@@ -91,8 +128,9 @@ def two_beam_means(
         left = kept & passes
         steps.append(Step(name, int(kept.sum()), int(left.sum()), "periods"))
         kept = left
-    ends = ((number[kept] + 1) * length).astype("datetime64[ns]")
-    return TwoBeamMeans(ends, count[kept], TwoBeamWind(*(values[kept] for values in wind)), tuple(steps))
+    return TwoBeamMeans(
+        time_utc[kept], count[kept], TwoBeamWind(*(values[kept] for values in wind)), tuple(steps)
+    )
 
 
 def _means(values: FloatArray, place: IntArray, periods: int) -> tuple[IntArray, FloatArray]:

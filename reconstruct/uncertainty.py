@@ -12,7 +12,7 @@ from geometry.arrays import FloatArray
 from geometry.beams import unit_vector
 from geometry.errors import InputError
 from reconstruct import responses
-from reconstruct.radial_speed import gradient_per_s, radial_speed_mps, wind_at_mps
+from reconstruct.radial_speed import gradient_per_s, power_law_mps, wind_at_mps
 from reconstruct.rays import Rays
 from reconstruct.wind import WindState, uv_mps
 
@@ -208,15 +208,13 @@ def wind_covariance_by_source(
     array([[0.01, 0.  ],
            [0.  , 0.01]])
     """
+    of_lidar = (rays.lidar[:, None] == np.arange(len(rays.probes))).astype(float)
     out: dict[str, FloatArray] = {}
     for error in ray_errors(rays, wind, sources):
-        own = gain * error.response_mps * np.sqrt(1 - error.correlation)
-        part = own @ own.T
-        for lidar in range(len(rays.probes)):
-            mine = rays.lidar == lidar
-            shared = gain[:, mine] @ (error.response_mps * np.sqrt(error.correlation))[mine]
-            part = part + np.outer(shared, shared)
-        out[error.source] = out.get(error.source, np.zeros((2, 2))) + part
+        carried = gain * error.response_mps
+        own = carried * np.sqrt(1 - error.correlation)
+        shared = (carried * np.sqrt(error.correlation)) @ of_lidar  # (2, lidar)
+        out[error.source] = out.get(error.source, 0.0) + own @ own.T + shared @ shared.T
     return out
 
 
@@ -242,19 +240,20 @@ def mean_errors_mps(gain: FloatArray, rays: Rays, wind: WindState) -> dict[str, 
     ...     state)["vertical wind"].round(4) + 0.0
     array([0.    , 0.0885])
     """
-    centre = rays.centre_m
+    beam = unit_vector(rays.azimuth_deg, rays.elevation_deg)
+    east, north, up = (rays.head_m + rays.range_m[:, None] * beam).T
     u, v = uv_mps(1.0, wind.from_deg)
-    right = centre[:, 0] * v - centre[:, 1] * u
-    lateral = wind.lateral_gradient_per_s * right
-    sheared = np.hypot(
-        *wind_at_mps(WindState(**{**vars(wind), "lateral_gradient_per_s": 0.0}), centre)[:, :2].T
+    along = beam[:, 0] * u + beam[:, 1] * v
+    sheared = power_law_mps(
+        wind.height_m + up,
+        speed_mps=wind.speed_mps,
+        reference_height_m=wind.height_m,
+        exponent=wind.shear_exponent,
     )
-    angles = rays.azimuth_deg, rays.elevation_deg
     return {
-        "vertical wind": gain @ radial_speed_mps(*angles, 0.0, 0.0, wind.vertical_mps),
-        "lateral gradient": gain @ radial_speed_mps(*angles, lateral * u, lateral * v),
-        "shear": gain
-        @ radial_speed_mps(*angles, (sheared - wind.speed_mps) * u, (sheared - wind.speed_mps) * v),
+        "vertical wind": gain @ (wind.vertical_mps * beam[:, 2]),
+        "lateral gradient": gain @ (wind.lateral_gradient_per_s * (east * v - north * u) * along),
+        "shear": gain @ ((sheared - wind.speed_mps) * along),
     }
 
 
@@ -347,7 +346,8 @@ def _for_each_ray(rays: Rays, sources: ErrorSources | Sequence[ErrorSources]) ->
 def _view(rays: Rays, wind: WindState) -> responses.View:
     azimuth, elevation = np.radians(rays.azimuth_deg), np.radians(rays.elevation_deg)
     beam = unit_vector(rays.azimuth_deg, rays.elevation_deg)
-    seen, gradient = wind_at_mps(wind, rays.centre_m), gradient_per_s(wind, rays.centre_m)
+    centre = rays.head_m + rays.range_m[:, None] * beam
+    seen, gradient = wind_at_mps(wind, centre), gradient_per_s(wind, centre)
     u, v = uv_mps(1.0, wind.from_deg)
     return responses.View(
         sin_azimuth=np.sin(azimuth),

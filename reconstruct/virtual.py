@@ -16,8 +16,15 @@ from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.error_draws import Draws, draw_pointing, draw_speed_errors
 from reconstruct.field import Field, synthesise
-from reconstruct.flight import Sampling, WaveSight, radial_speed_mps, reach_m, to_wind_frame
-from reconstruct.monte_carlo import REFERENCE_INTERVAL_S, Air, reference_uv_mps, scans_in, spread_shifts_m
+from reconstruct.flight import ComplexArray, Sampling, WaveSight, radial_speed_mps, reach_m, to_wind_frame
+from reconstruct.monte_carlo import (
+    REFERENCE_INTERVAL_S,
+    Air,
+    reference_phase,
+    reference_uv_mps,
+    scans_in,
+    spread_shifts_m,
+)
 from reconstruct.periods import TEN_MINUTES_S
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
@@ -168,7 +175,7 @@ class _Passing(NamedTuple):
 
     air: Air
     shift_m: FloatArray  # (3,)
-    amplitudes: FloatArray  # of the field's waves
+    amplitudes: ComplexArray  # of the field's waves
 
 
 def _lasting(scan: VirtualScan, seed: int) -> _Lasting:
@@ -226,8 +233,9 @@ def _radial_speeds(
             std_mps=air.std_mps,
             shift_m=passing.shift_m + offset_m,
         )
-        sight = WaveSight.of(rays, wind, air.field.waves, errors, offset_m=offset_m)
-        clean += air.std_mps * sight.radial_speed(passing.amplitudes, shape[1])
+        waves = air.field.waves
+        sight = WaveSight.of(rays, wind, waves, errors, scans=shape[1], offset_m=offset_m)
+        clean += air.std_mps * sight.radial_speed(passing.amplitudes)
     noise, _ = draw_speed_errors(sources, rays, shape, rng)
     return np.asarray(clean * lasting.factor + lasting.speed_mps + noise[0])
 
@@ -236,4 +244,5 @@ def _reference(state: WindState, passing: _Passing | None, averaging_s: float) -
     """(sample, 2) eastward and northward wind that a point instrument at the reference meets [m/s]."""
     if passing is None:
         return np.tile(state.uv_mps, (int(averaging_s / REFERENCE_INTERVAL_S), 1))
-    return reference_uv_mps(state, passing.air, passing.shift_m, passing.amplitudes, averaging_s)
+    phase = reference_phase(state, passing.air.field.waves, averaging_s)
+    return reference_uv_mps(state, passing.air, passing.shift_m, passing.amplitudes, phase)

@@ -8,16 +8,20 @@ the same air (two beams, a beam and the target, one scan and the next) sees the 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.arrays import FloatArray
 from reconstruct.spectra import Tensor, Turbulence, spectral_tensor
 
-# Waves hand over from those drawn here to those of the box like a bell curve, exp(-(k L / 3)²): the longest, where
+# Waves hand over from those drawn here to those of the box like a bell curve, exp(-(k L / 6)²): the longest, where
 # a sheared tensor is not smooth and no box is long enough, are all drawn here.
-LONG_WAVES = 3.0  # wavenumber times L
+LONG_WAVES = 6.0  # wavenumber times L
 _LONGEST_OVER = 2.5  # times that, the bell is .002: the box has the rest
-LONG_COUNT = 1024
+LONG_COUNT = 1536
 SHORT_COUNT = 512
+# Steps of a sequence that fills a cube evenly, powers of the root of x^4 = x + 1. Drawn at random instead, as a Latin
+# hypercube, waves of one draw miss the variance of ten minutes by 11 % (rms) instead of 4 %.
+_STEPS = 1.2207440846057596 ** -np.array([1.0, 2.0, 3.0])
 
 
 class Waves(NamedTuple):
@@ -30,9 +34,9 @@ class Waves(NamedTuple):
     first: FloatArray  # (3, wave)
     second: FloatArray  # (3, wave)
 
-    def amplitudes(self, rng: np.random.Generator) -> FloatArray:
-        """Draw (2, 2, wave) normal numbers: real and imaginary parts of a and of b."""
-        return np.asarray(rng.standard_normal((2, 2, self.vector.shape[1])))
+    def amplitudes(self, rng: np.random.Generator) -> NDArray[np.complex64]:
+        """Draw a and b (2, wave): real and imaginary parts are standard normal."""
+        return rng.standard_normal((2, 2 * self.vector.shape[1]), dtype=np.float32).view(np.complex64)
 
 
 def draw_waves(
@@ -68,16 +72,17 @@ def draw_waves(
 
     Notes
     -----
-    Randomisation of the spectrum (Kraichnan 1970, Phys. Fluids 13, 22-31, doi:10.1063/1.1692799) with importance and
-    stratified sampling: wavenumbers evenly up to the bell's end, and beyond the cut as the inertial subrange has its
-    variance; the cosine to the wind as a cube, which crowds the waves that a mean over minutes leaves; each of the three
-    coordinates takes one value in each of `count` equal parts.
+    Randomisation of the spectrum (Kraichnan 1970, Phys. Fluids 13, 22-31, doi:10.1063/1.1692799) with importance
+    sampling: wavenumbers evenly up to the bell's end, and beyond the cut as the inertial subrange has its variance; the
+    cosine to the wind as a cube, which crowds the waves that a mean over minutes leaves. The three coordinates are an
+    additive sequence from a random start (Cranley & Patterson 1976, SIAM J. Numer. Anal. 13, 904-914): it fills
+    their cube evenly, and every single wave is anywhere with the same probability.
 
     Examples
     --------
     >>> waves = draw_waves(Turbulence(0.1, 170.0), np.pi / 14, rng=np.random.default_rng(1))
     >>> waves.vector.shape, bool(np.allclose(np.sum(waves.vector * waves.first, axis=0), 0.0))
-    ((3, 1536), True)
+    ((3, 2048), True)
     """
     longest = LONG_WAVES * _LONGEST_OVER / turbulence.length_m
     share, direction, solid_angle = _directions(long_count, rng)
@@ -98,7 +103,7 @@ def long_share(turbulence: Turbulence, wavenumber_per_m: FloatArray) -> FloatArr
 
     Examples
     --------
-    >>> long_share(Turbulence(0.1, 100.0), np.array([0.0, 0.03, 0.08])).round(3)
+    >>> long_share(Turbulence(0.1, 100.0), np.array([0.0, 0.06, 0.16])).round(3)
     array([1.   , 0.368, 0.   ])
     """
     scaled = wavenumber_per_m * (turbulence.length_m / LONG_WAVES)
@@ -129,8 +134,8 @@ def tensor_root(k: FloatArray, tensor: Tensor) -> tuple[FloatArray, FloatArray]:
 
 def _directions(count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A number in (0, 1], a unit vector (3, wave) that crowds where it is normal to the wind, and its solid angle."""
-    strata = np.stack([rng.permutation(count) for _ in range(3)])
-    share, root, turn = (strata + 1.0 - rng.uniform(size=strata.shape)) / count
+    start = rng.uniform(size=3)[:, None]
+    share, root, turn = 1 - (start + _STEPS[:, None] * np.arange(count)) % 1.0
     root, turn = 2 * root - 1, 2 * np.pi * turn
     cosine = root**3
     level = np.sqrt(1 - cosine**2)

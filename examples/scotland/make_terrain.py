@@ -15,13 +15,17 @@ from geometry.arrays import FloatArray
 from planner.files.raster import write_geotiff
 
 HERE = Path(__file__).resolve().parent
-CRS = "EPSG:32630+5701"  # UTM 30N with Ordnance Datum Newlyn: the file says itself what its heights count from
+CRS = (
+    "EPSG:32630+5701"  # UTM 30N with Ordnance Datum Newlyn: the file says itself what its heights count from
+)
 WEST_M, EAST_M, SOUTH_M, NORTH_M, CELL_M = 533_500.0, 538_500.0, 6_181_000.0, 6_186_000.0, 25.0
 
 UNDER_HEADS_M = 2.0
-UNDER_TARGETS_M = 40.0  # assumed: nothing says how high above the ground the points are
+UNDER_TARGETS_M = 50.0  # assumed: nothing says how high above the ground the points are
 HILL_M = 450.0  # standard width of a hill
-LOOSE = 0.05  # how loosely the ground follows the points, as a share of a hill's height squared; the heads firmly
+LOOSE = (
+    0.05  # how loosely the ground follows the points, as a share of a hill's height squared; the heads firmly
+)
 RIPPLES, RIPPLE_M, SEED = 60, 2.5, 30
 
 

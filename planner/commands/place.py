@@ -91,11 +91,13 @@ def place(
 
 def _written(found: "Placement", out: Path) -> tuple[list[str], str | None]:
     """Write tables, maps and figures; gives the files, and why there is no GeoTIFF."""
-    from planner.figures.placement_map import criteria_maps, error_map
+    from planner.figures.placement_map import criteria_maps, error_map, sight_map
     from planner.output import output_folder
     from planner.placement.write import write_all
 
     pictures = {"place.png": error_map(found), "place-criteria.png": criteria_maps(found)}
+    if (in_sight := sight_map(found)) is not None:
+        pictures["place-sight.png"] = in_sight
     with output_folder(out) as folder:
         names, lacking = write_all(found, folder)
         for name, picture in pictures.items():

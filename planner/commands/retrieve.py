@@ -61,14 +61,15 @@ def retrieve(
 
 
 def _print(found: "Retrieved", *, quiet: bool) -> None:
-    from planner.analysis_files import ALONE, told, told_losses
+    from planner.analysis_files import scan_lines
+    from planner.clocks import told_trims
     from planner.commands.table import print_table
 
-    for scan, steps in found.steps.items():
-        for note in (*found.notes[scan], *map(told, steps)):
-            remark(f"{scan}: {note}", quiet=quiet)
-        for line in told_losses(found.lost[scan]) if scan not in found.alone else [ALONE]:
-            remark(f"{scan}: {'' if scan in found.alone else 'no wind for '}{line}", quiet=quiet)
+    for scan in found.steps:
+        for line in scan_lines(found, scan):
+            remark(f"{scan}: {line}", quiet=quiet)
+    for line in told_trims(found.sonics):
+        remark(line, quiet=quiet)
     for pair, gaps in found.gaps.items():
         if gaps:
             rows = [
@@ -77,6 +78,8 @@ def _print(found: "Retrieved", *, quiet: bool) -> None:
             ]
             heads = ("longest gap s", "pairs", "of the rays", "mean gap s", "std in 10 min m/s")
             print_table(f"{pair}: rays paired within a time gap", heads, rows)
+    for period_s, count in found.means.items():
+        remark(f"means_{period_s:g}s: {count} rows", quiet=quiet)
 
 
 def _document(found: "Retrieved") -> dict[str, object]:
@@ -104,6 +107,20 @@ def _document(found: "Retrieved") -> dict[str, object]:
                 for name, drift in logged.drifts.items()
             }
             for scan, logged in found.drifts.items()
+        },
+        "clocks": {
+            scan: {key: _known(value) for key, value in lag._asdict().items()}
+            for scan, lag in found.clocks.items()
+        },
+        "sonics": {
+            name: {
+                "scan": each.scan,
+                "trim_deg": _known(each.trim.trim_deg),
+                "mismatch_before_mps": _known(each.trim.before_mps),
+                "mismatch_after_mps": _known(each.trim.after_mps),
+                "lag_s": _known(each.lag.lag_s),
+            }
+            for name, each in found.sonics.items()
         },
         "means": {f"{period_s:g}": rows for period_s, rows in found.means.items()},
     }

@@ -1,26 +1,27 @@
-"""A campaign against its mast: scatter, time series, residual against direction, regression per sector size, wind."""
+"""A campaign against its mast: scatter, time series, residual against direction, regression per sector size."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from geometry.angles import difference_deg
 from geometry.arrays import FloatArray
 from planner.figures.canvas import canvas, image
 from planner.figures.names import shown
 from planner.palette import EXCLUDED, INK, INK_SOFT, LIDARS
 from reconstruct.averaging import TimeArray
-from reconstruct.comparison import WeibullFit, fit_weibull, residual_by_direction
+from reconstruct.comparison import residual_by_direction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MAST, LIDAR, PREDICTED = INK, LIDARS[0], EXCLUDED
-ROSE_SECTORS = 12
-ROSE_SPEEDS_MPS = (0.0, 5.0, 10.0, 15.0, np.inf)
 LEAST_PERIODS = 2
+HEAD_IN = 0.56  # of the paper, for the title and the line under it
+LONG_AXIS_MPS = 14.0  # marked every 5 m/s, a shorter one every 2 m/s
+MARKS = ".x+1"  # beside the colour, for who does not see it
 
 
 class Series(NamedTuple):
@@ -33,6 +34,7 @@ class Series(NamedTuple):
     mast_mps: FloatArray
     mast_deg: FloatArray
     slope: float  # mast = slope · lidar
+    turn: tuple[float, float] = (1.0, 0.0)  # mast = turn[0] · lidar + turn[1], directions [deg]
 
 
 class SizeCurve(NamedTuple):
@@ -42,164 +44,181 @@ class SizeCurve(NamedTuple):
     slope: FloatArray
     slope_standard_error: FloatArray
     residual_std_mps: FloatArray
+    residual_std_standard_error_mps: FloatArray
     direction_std_deg: FloatArray
+    direction_std_standard_error_deg: FloatArray
     predicted_slope: FloatArray
     predicted_residual_std_mps: FloatArray
     predicted_direction_std_deg: FloatArray
 
 
-def scatter(series: Series, *, title: str) -> bytes:
-    """Mast against lidar with the line through the origin, and the spread of both as boxes at the margins, as PNG."""
-    with canvas(5.2, 5.2) as figure:
-        grid = figure.add_gridspec(2, 2, width_ratios=(9, 1), height_ratios=(1, 9), wspace=0.02, hspace=0.02)
-        axes = figure.add_subplot(grid[1, 0])
-        above, right = (
-            figure.add_subplot(grid[0, 0], sharex=axes),
-            figure.add_subplot(grid[1, 1], sharey=axes),
-        )
-        top = 1.05 * float(max(np.max(series.lidar_mps), np.max(series.mast_mps)))
+def scatter(series: Series, *, where: str, top_mps: float | None = None) -> bytes:
+    """Mast against lidar with the line through the origin, and the spread of both as boxes at the margins, as PNG.
+
+    Parameters
+    ----------
+    series
+        One sector size.
+    where
+        Campaign and scan, for the line under the title: untrusted text.
+    top_mps
+        End of both axes [m/s]; default: a little above the highest value.
+    """
+    top = top_mps or 1.05 * float(max(np.max(series.lidar_mps), np.max(series.mast_mps)))
+    with canvas(5.4, 5.8) as figure:
+        title(figure, "Wind speed: mast against lidar", f"{where}, {told(series)}")
+        axes, above, right = _margins(figure)
         axes.plot([0, top], [0, top], color=INK_SOFT, linewidth=0.9, linestyle=(0, (4, 3)), label="equal")
         axes.plot(
-            [0, top],
-            [0, series.slope * top],
-            color=PREDICTED,
-            linewidth=1.4,
-            label=f"{series.slope:.4f} × lidar",
-        )
+            [0, top], [0, series.slope * top], color=PREDICTED, linewidth=1.4, label=f"mast = {series.slope:.4f} × lidar"
+        )  # fmt: skip
         axes.plot(series.lidar_mps, series.mast_mps, "o", color=LIDAR, markersize=3.5, alpha=0.6)
         axes.set(xlim=(0, top), ylim=(0, top), xlabel="lidar [m/s]", ylabel="mast [m/s]", aspect="equal")
+        ticks = np.arange(0.0, top, 5.0 if top > LONG_AXIS_MPS else 2.0)
+        axes.set(xticks=ticks, yticks=ticks)
         axes.legend(loc="upper left")
         _box(above, series.lidar_mps, "horizontal")
         _box(right, series.mast_mps, "vertical")
-        _title(figure, f"{title}, {series.label}")
         return image(figure)
 
 
-def time_series(series: Sequence[Series], *, title: str) -> bytes:
+def turn_scatter(series: Series, *, where: str) -> bytes:
+    """The mast's direction against the lidar's with the line fitted on the circle, as PNG."""
+    slope, offset_deg = series.turn
+    with canvas(5.4, 5.8) as figure:
+        title(figure, "Wind direction: mast against lidar", f"{where}, {told(series)}")
+        axes = figure.add_subplot()
+        ends = np.array([0.0, 360.0])
+        axes.plot(ends, ends, color=INK_SOFT, linewidth=0.9, linestyle=(0, (4, 3)), label="equal")
+        axes.plot(
+            ends, slope * ends + offset_deg, color=PREDICTED, linewidth=1.4,
+            label=f"mast = {slope:.4f} × lidar {offset_deg:+.2f}°, fitted on the circle",
+        )  # fmt: skip
+        axes.plot(series.lidar_deg, series.mast_deg, "o", color=LIDAR, markersize=3.5, alpha=0.6)
+        axes.set(
+            xlim=(0, 360),
+            ylim=(0, 360),
+            xlabel="lidar, wind from [°]",
+            ylabel="mast, wind from [°]",
+            aspect="equal",
+        )
+        axes.set_xticks(range(0, 361, 60))
+        axes.set_yticks(range(0, 361, 60))
+        axes.legend(loc="upper left")
+        return image(figure)
+
+
+def time_series(series: Sequence[Series], *, where: str) -> bytes:
     """Speed and direction of the mast and of some sizes over time, as PNG."""
-    with canvas(9.5, 5.0) as figure:
+    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+    with canvas(9.5, 5.4) as figure:
+        title(figure, "Wind speed and direction over time (UTC)", where)
         upper, lower = figure.subplots(2, 1, sharex=True)
         first = series[0]
-        for axes, mast, name in ((upper, first.mast_mps, "speed [m/s]"), (lower, first.mast_deg, "from [°]")):
-            axes.plot(first.time_utc, mast, "o", color=MAST, markersize=3, label="mast")
+        for axes, mast, name in (
+            (upper, first.mast_mps, "speed [m/s]"), (lower, first.mast_deg, "wind from [°]")
+        ):  # fmt: skip
+            axes.plot(
+                first.time_utc, mast, "o", color=MAST, markersize=5, markerfacecolor="none", label="mast"
+            )
             axes.set_ylabel(name)
         for number, one in enumerate(series):
-            colour = LIDARS[number % len(LIDARS)]
+            look = {"color": LIDARS[number % len(LIDARS)], "linestyle": "none", "markersize": 4}
             for axes, values in ((upper, one.lidar_mps), (lower, one.lidar_deg)):
-                axes.plot(one.time_utc, values, ".", color=colour, markersize=4, label=f"lidar, {one.label}")
+                axes.plot(
+                    one.time_utc, values, MARKS[number % len(MARKS)], label=f"lidar, {one.label}", **look
+                )
         lower.set_ylim(0, 360)
         lower.set_yticks(range(0, 361, 90))
-        upper.legend(loc="upper right", ncols=len(series) + 1)
-        figure.autofmt_xdate()
-        _title(figure, title)
+        upper.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(series) + 1)
+        locator = AutoDateLocator()  # type: ignore[no-untyped-call]
+        lower.xaxis.set_major_locator(locator)
+        lower.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
         return image(figure)
 
 
-def by_direction(series: Series, *, title: str, bin_deg: float = 10.0) -> bytes:
+def by_direction(series: Series, *, where: str, bin_deg: float = 10.0) -> bytes:
     """Residuals of speed and direction against where the wind comes from, as PNG: a wake shows as a dent."""
-    from geometry.angles import difference_deg
-
     speed = series.mast_mps - series.slope * series.lidar_mps
     angle = np.asarray(difference_deg(series.mast_deg, series.lidar_deg))
-    with canvas(8.5, 5.2) as figure:
-        names = ("mast − slope × lidar [m/s]", "mast − lidar [°]")
-        for axes, residual, name in zip(
-            figure.subplots(2, 1, sharex=True), (speed, angle), names, strict=True
-        ):
+    with canvas(8.5, 5.6) as figure:
+        title(figure, "Residuals against wind direction: a wake shows as a dent", f"{where}, {told(series)}")
+        names = (f"mast − {series.slope:.3f} × lidar\n[m/s]", "mast − lidar\n[°]")
+        rows = figure.subplots(2, 1, sharex=True)
+        for axes, residual, name in zip(rows, (speed, angle), names, strict=True):
             found = residual_by_direction(series.mast_deg, residual, bin_deg=bin_deg)
             there = found.count > 0
-            axes.plot(series.mast_deg, residual, ".", color=INK_SOFT, markersize=2.5, alpha=0.5)
-            axes.vlines(
-                found.from_deg[there], found.lower[there], found.upper[there], color=LIDAR, linewidth=3
-            )
-            axes.plot(found.from_deg[there], found.median[there], "o", color=PREDICTED, markersize=4)
+            at = found.from_deg[there]
             axes.axhline(0.0, color=INK, linewidth=0.8)
-            axes.set_ylabel(name)
-            axes.set_xlim(0, 360)
+            axes.vlines(
+                at, found.lower[there], found.upper[there], color=LIDAR, linewidth=4, alpha=0.45,
+                label=f"quartiles of {bin_deg:g}°",
+            )  # fmt: skip
+            axes.plot(series.mast_deg, residual, ".", color=INK_SOFT, markersize=3, label="a period")
+            axes.plot(
+                at, found.median[there], "D", color=PREDICTED, markersize=4, label=f"median of {bin_deg:g}°"
+            )
+            axes.set(ylabel=name, xlim=(0, 360))
             axes.set_xticks(range(0, 361, 30))
-        axes.set_xlabel("wind from [°], mast; dot: median, bar: quartiles")
-        _title(figure, f"{title}, {series.label}")
+        rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+        rows[1].set_xlabel("wind from [°], mast")
         return image(figure)
 
 
-def per_size(curve: SizeCurve, *, title: str) -> bytes:
+def per_size(curve: SizeCurve, *, where: str) -> bytes:
     """Slope and scatter against the sector size, measured and predicted, as PNG."""
     panels = (
-        ("slope, mast = slope × lidar", curve.slope, curve.predicted_slope, curve.slope_standard_error),
-        ("residual [m/s]", curve.residual_std_mps, curve.predicted_residual_std_mps, None),
-        ("direction [°]", curve.direction_std_deg, curve.predicted_direction_std_deg, None),
-    )
-    with canvas(10.0, 3.4) as figure:
-        for axes, (name, measured, predicted, error) in zip(figure.subplots(1, 3), panels, strict=True):
-            axes.errorbar(
-                curve.sector_deg,
-                measured,
-                yerr=error,
-                fmt="o",
-                color=LIDAR,
-                markersize=4,
-                capsize=2,
-                label="measured",
-            )
+        ("Slope: mast = slope × lidar", "slope", curve.slope, curve.predicted_slope, curve.slope_standard_error),
+        (
+            "Scatter of mast − slope × lidar", "standard deviation [m/s]", curve.residual_std_mps,
+            curve.predicted_residual_std_mps, curve.residual_std_standard_error_mps,
+        ),
+        (
+            "Scatter of direction about its line", "standard deviation [°]", curve.direction_std_deg,
+            curve.predicted_direction_std_deg, curve.direction_std_standard_error_deg,
+        ),
+    )  # fmt: skip
+    with canvas(11.0, 4.0) as figure:
+        title(figure, "Regression against the mast, by sector size", f"{where}; bars: standard error")
+        for axes, (name, unit, measured, predicted, error) in zip(figure.subplots(1, 3), panels, strict=True):
             if np.any(np.isfinite(predicted)):
                 axes.plot(curve.sector_deg, predicted, "-", color=PREDICTED, linewidth=1.5, label="predicted")
-            axes.set(xlabel="sector [°]", title=name)
-            axes.title.set_fontsize(10.5)
+            axes.errorbar(
+                curve.sector_deg, measured, yerr=error, fmt="o", color=LIDAR, markersize=4, capsize=2, label="measured"
+            )  # fmt: skip
+            axes.set(xlabel="sector [°]", ylabel=unit)
+            axes.set_title(name, fontsize=10)
             axes.legend()
-        _title(figure, title)
         return image(figure)
 
 
-def wind(series: Series, *, title: str) -> bytes:
-    """Density of speeds with their Weibull distributions, and the wind roses of mast and lidar, as PNG."""
-    with canvas(10.0, 3.6) as figure:
-        density = figure.add_subplot(1, 3, 1)
-        _densities(density, series)
-        pairs = (("mast", series.mast_mps, series.mast_deg), ("lidar", series.lidar_mps, series.lidar_deg))
-        for number, (name, speed, angle) in enumerate(pairs):
-            _rose(figure, number + 2, name, speed, angle)
-        _title(figure, f"{title}, {series.label}")
-        return image(figure)
+def told(series: Series) -> str:
+    """What a figure of one size says of it."""
+    count = len(series.time_utc)
+    return f"{series.label}, {count} period{'' if count == 1 else 's'}"
 
 
-def _densities(axes: "Axes", series: Series) -> None:
-    top = float(max(np.max(series.lidar_mps), np.max(series.mast_mps)))
-    edges = np.arange(0.0, top + 1.0, 1.0)
-    at = np.linspace(1e-3, top, 200)
-    for name, speed, colour in (("mast", series.mast_mps, MAST), ("lidar", series.lidar_mps, LIDAR)):
-        axes.hist(speed, bins=edges.tolist(), density=True, histtype="step", color=colour, linewidth=1.2)
-        fit = fit_weibull(speed)
-        axes.plot(at, _weibull_density(at, fit), color=colour, linewidth=1.0, linestyle=(0, (4, 3)),
-                  label=f"{name}: A {fit.scale_mps:.1f}, k {fit.shape:.2f}")  # fmt: skip
-    axes.set(xlabel="speed [m/s]", ylabel="density [1/(m/s)]", ylim=(0, 1.3 * axes.get_ylim()[1]))
-    axes.legend(fontsize=8)
-
-
-def _weibull_density(speed: FloatArray, fit: WeibullFit) -> FloatArray:
-    share = speed / fit.scale_mps
-    return np.asarray(fit.shape / fit.scale_mps * share ** (fit.shape - 1) * np.exp(-(share**fit.shape)))
-
-
-def _rose(figure: "Figure", place: int, name: str, speed: FloatArray, angle: FloatArray) -> None:
-    axes = figure.add_subplot(1, 3, place, projection="polar")
-    axes.set_theta_zero_location("N")  # type: ignore[attr-defined]
-    axes.set_theta_direction(-1)  # type: ignore[attr-defined]
-    width = 360.0 / ROSE_SECTORS
-    sector = (np.mod(angle + width / 2, 360.0) // width).astype(int) % ROSE_SECTORS
-    bottom = np.zeros(ROSE_SECTORS)
-    for number, (low, high) in enumerate(pairwise(ROSE_SPEEDS_MPS)):
-        inside = (speed >= low) & (speed < high)
-        share = np.bincount(sector[inside], minlength=ROSE_SECTORS) / len(speed)
-        label = f"{low:g} to {high:g} m/s" if np.isfinite(high) else f"over {low:g} m/s"
-        axes.bar(
-            np.radians(np.arange(ROSE_SECTORS) * width), share, np.radians(0.9 * width), bottom=bottom,
-            color=LIDARS[number % len(LIDARS)], label=label,
+def title(figure: "Figure", what: str, where: str) -> None:
+    """Say above a figure what it shows, and under that of what."""
+    width_in, height_in = figure.get_size_inches()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0, 0, 1, 1 - HEAD_IN / height_in))  # type: ignore[call-arg]
+    longest = int(width_in * 13)  # letters of the second size to the inch
+    lines = ((0.06, what, 90, 12, "bold", INK), (0.30, where, longest, 9, "normal", INK_SOFT))
+    for down_in, text, most, size, weight, colour in lines:
+        figure.text(
+            0.01, 1 - down_in / height_in, shown(text, longest=most), fontsize=size, fontweight=weight, color=colour,
+            ha="left", va="top", parse_math=False,
         )  # fmt: skip
-        bottom += share
-    axes.set_yticklabels([])
-    axes.set_title(name, fontsize=10)
-    if place == 3:
-        axes.legend(loc="center left", bbox_to_anchor=(1.15, 0.5), fontsize=7.5)
+
+
+def _margins(figure: "Figure") -> tuple["Axes", "Axes", "Axes"]:
+    """Axes with a strip above and one at the right."""
+    grid = figure.add_gridspec(2, 2, width_ratios=(9, 1), height_ratios=(1, 9), wspace=0.02, hspace=0.02)
+    axes = figure.add_subplot(grid[1, 0])
+    return axes, figure.add_subplot(grid[0, 0], sharex=axes), figure.add_subplot(grid[1, 1], sharey=axes)
 
 
 def _box(axes: "Axes", values: FloatArray, way: Literal["vertical", "horizontal"]) -> None:
@@ -209,11 +228,6 @@ def _box(axes: "Axes", values: FloatArray, way: Literal["vertical", "horizontal"
         widths=0.6,
         flierprops={"markersize": 2},
         medianprops={"color": PREDICTED},
+        manage_ticks=False,
     )
     axes.set_axis_off()
-
-
-def _title(figure: "Figure", text: str) -> None:
-    figure.suptitle(
-        shown(text, longest=90), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False
-    )

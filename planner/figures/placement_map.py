@@ -63,12 +63,46 @@ def criteria_maps(found: Placement) -> bytes:
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
     high, wide = _size(found)
-    with canvas(3.4 * columns, (3.2 * high / wide + 0.9) * rows) as figure:
+    with canvas(3.4 * columns, (3.2 * high / wide + 0.9) * rows + 0.5) as figure:
+        figure.suptitle(
+            "What is left over of each criterion, at the target where it is least", x=0.01, ha="left"
+        )
         panels = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
         for axes, name in zip(panels, names, strict=False):
             _criterion(figure, axes, found, name, slack.get(name, least_slack(found.seen)[name]))
         for axes in panels[len(names) :]:
             axes.set_visible(False)
+        return image(figure)
+
+
+def sight_map(found: Placement) -> bytes | None:
+    """Draw how many targets a head at each place sees over the terrain, as a PNG; None without a terrain."""
+    if found.task.terrain is None:
+        return None
+    from matplotlib.colors import BoundaryNorm
+
+    slack = found.seen.slack["terrain"]
+    count = len(found.task.targets)
+    seen = np.where(np.isnan(slack).all(axis=0), np.nan, (slack >= 0.0).sum(axis=0)).reshape(found.grid.shape)
+    high, wide = _size(found)
+    steps = np.unique(np.linspace(0, count + 1, min(count + 1, 12) + 1).round()).astype(int)
+    with canvas(WIDTH_IN, WIDTH_IN * high / wide * 0.8 + 1.1) as figure:
+        axes = figure.add_subplot()
+        _frame(axes, found)
+        norm = BoundaryNorm(steps - 0.5, 256)
+        shown = axes.pcolormesh(
+            *_middle(found), seen, cmap="cividis", norm=norm, shading="nearest", rasterized=True
+        )
+        bar = figure.colorbar(shown, ax=axes, shrink=0.8, ticks=(steps[1:] + steps[:-1]) / 2 - 0.5)
+        spans = zip(steps[:-1], steps[1:] - 1, strict=True)
+        bar.set_ticklabels([f"{low}" if low == high else f"{low}–{high}" for low, high in spans])
+        bar.set_label(f"targets, of {count}, that a head there sees over the terrain", color=INK)
+        _things(axes, found)
+        height_m = found.task.head_height_m
+        axes.set_title(
+            f"{found.task.site.name}: in sight of a head {height_m:.1f} m above the ground", parse_math=False
+        )
+        _legend(figure, axes, flat=False)
         return image(figure)
 
 
@@ -228,10 +262,12 @@ def _name(axes: "Axes", text: str, here: FloatArray) -> None:
 
     low, high = axes.get_xlim()
     right = here[0] > low + 0.75 * (high - low)
+    bottom, top = axes.get_ylim()
+    below = here[1] > bottom + 0.95 * (top - bottom)
     axes.annotate(
         text,
         tuple(here),
-        xytext=(-9 if right else 9, 6),
+        xytext=(-9 if right else 9, -12 if below else 6),
         textcoords="offset points",
         ha="right" if right else "left",
         fontsize=9,

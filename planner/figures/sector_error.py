@@ -9,7 +9,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from planner.figures.canvas import canvas, image
 from planner.figures.names import shown
-from planner.palette import EXCLUDED, INK_SOFT, LIDARS
+from planner.palette import INK_SOFT, LIDARS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,14 +29,6 @@ class TierCurve(NamedTuple):
     mean10_speed_bias_mps: FloatArray  # (size,) of a ten-minute mean
     mean10_speed_std_mps: FloatArray
     mean10_direction_std_deg: FloatArray
-    slope: FloatArray
-
-
-class Published(NamedTuple):
-    """Measured slopes to set beside the predicted ones."""
-
-    label: str
-    sector_deg: FloatArray  # (size,)
     slope: FloatArray
 
 
@@ -73,7 +65,6 @@ def sector_error(
     *,
     title: str,
     recommended_deg: float | None = None,
-    published: Published | None = None,
 ) -> bytes | None:
     """Draw the errors against the sector size as a PNG; panels of which nothing is known are left out.
 
@@ -85,8 +76,6 @@ def sector_error(
         What is measured: untrusted text.
     recommended_deg
         Marked by a line; None where there is no recommendation.
-    published
-        Slopes of a measurement.
 
     Returns
     -------
@@ -106,15 +95,6 @@ def sector_error(
         all_axes = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
         for axes, panel in zip(all_axes, panels, strict=False):
             _panel(axes, panel, curves, recommended_deg)
-            if published is not None and panel.title.startswith("Slope"):
-                axes.plot(
-                    published.sector_deg,
-                    published.slope,
-                    "o",
-                    color=EXCLUDED,
-                    markersize=6,
-                    label=published.label,
-                )
         for axes in all_axes[len(panels) :]:
             axes.set_axis_off()
         for axes in all_axes[max(len(panels) - columns, 0) : len(panels)]:

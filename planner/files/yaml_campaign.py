@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
@@ -12,7 +12,10 @@ from planner.faults import Fault, entries, key_of, spelled
 from planner.files.fault_words import fault_of, is_echo
 from planner.files.yaml_site import load_site
 from planner.files.yaml_tree import Tree, YamlFault
+from planner.nouns import Noun
 from planner.site import Site
+
+Placed = TypeVar("Placed", bound=Noun)
 
 MAX_BYTES = 5_000_000
 PATTERN = "*?["  # a path with one of these stands for many files
@@ -104,6 +107,12 @@ def _site(raw: Mapping[str, object], folder: Path) -> tuple[Site | None, list[Fa
 
 def _missing(raw: Mapping[str, object], folder: Path) -> Iterator[Fault]:
     """Files that the campaign names and that are not there."""
+    logs = [(("inputs", index, "attitude"), item.get("attitude")) for index, item in entries(raw, "inputs")]
+    sonics = [(("sonics", index), item) for index, item in entries(raw, "sonics")]
+    for where, item in (*logs, *sonics):
+        name = item.get("path") if isinstance(item, Mapping) else None
+        if isinstance(name, str) and not (folder / name).is_file():
+            yield Fault((*where, "path"), name, f"a file that exists (looked for {folder / name})")
     for index, item in entries(raw, "inputs"):
         name = item.get("path")
         if isinstance(name, str) and not (
@@ -142,6 +151,14 @@ def _unknown_names(raw: Mapping[str, object], site: Site) -> Iterator[Fault]:
         if name in read:
             yield Fault(("inputs", index, "scan"), name, "each scan once; name several files by one pattern")
         read.append(name)
+    for index, item in entries(raw, "sonics"):
+        name = item.get("scan")
+        if isinstance(name, str) and name not in read:
+            told = f"a scan that is an input: {', '.join(str(each) for each in read) or 'there is none'}"
+            yield Fault(("sonics", index, "scan"), name, told)
+    lag = raw.get("time_lag")
+    if isinstance(lag, Mapping) and lag.get("against") == "mast" and not raw.get("mast"):
+        yield Fault(("time_lag", "against"), "mast", "none, or give `mast: {path: ...}` too")
     listed = raw.get("pairs")
     for index, item in enumerate(listed if isinstance(listed, list) else ()):
         name = item.get("pair") if isinstance(item, Mapping) else item
@@ -162,15 +179,22 @@ def _report(name: str, found: list[YamlFault]) -> str:
 def _rooted(campaign: Campaign, folder: Path) -> Campaign:
     """The campaign with its paths as seen from the current folder."""
     inputs = tuple(
-        item if item.path is None else item.model_copy(update={"path": str(folder / item.path)})
+        _placed(item, folder).model_copy(update={"attitude": _placed(item.attitude, folder)})
         for item in campaign.inputs
     )
     mast = campaign.mast
     update: dict[str, object] = {
         "inputs": inputs,
+        "sonics": tuple(_placed(sonic, folder) for sonic in campaign.sonics),
         "site": folder / campaign.site,
         "output": folder / campaign.output,
     }
     if mast is not None:
         update["mast"] = mast.model_copy(update={"path": str(folder / mast.path)})
     return campaign.model_copy(update=update)
+
+
+def _placed(noun: "Placed", folder: Path) -> "Placed":
+    """The noun with its path as seen from the current folder."""
+    path = getattr(noun, "path", None)
+    return noun if path is None else noun.model_copy(update={"path": str(folder / path)})

@@ -14,6 +14,8 @@ from planner.plan import Plan
 from planner.report_tables import crossing_table, pointing_table
 from planner.report_values import Table, csv_text
 from planner.scan_layout import ScanLayout
+from planner.scan_plans import GatePlan
+from planner.site import Site
 
 Kind = Literal["gpkg", "kmz", "geojson", "csv", "halo", "windscanner", "scan-table", "field-sheet"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -22,6 +24,14 @@ MAKERS: dict[str, Callable[[Sequence[ScanLayout]], dict[str, str]]] = {
     "windscanner": windscanner.windscanner_files,
 }
 INSTRUMENTS = tuple(MAKERS)
+
+
+def with_gates(site: Site, gates: GatePlan) -> Site:
+    """The site with these range gates for every scan that declares none."""
+    scans = (
+        scan if scan.gates is not None else scan.model_copy(update={"gates": gates}) for scan in site.scans
+    )
+    return site.model_copy(update={"scans": tuple(scans)})
 
 
 class Choice(NamedTuple):
@@ -99,6 +109,8 @@ def export(
             if kind in kinds:
                 progress(f"{plan.site.name}: {kind}")
                 _write(plan, staging, kind, declination_deg)
+                if kind == "gpkg":
+                    _add_places(folder, staging / "plan.gpkg")
         written = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     return [folder / path for path in written]
 
@@ -144,6 +156,18 @@ def _write_gis(plan: Plan, folder: Path, kind: Kind) -> None:
 
 def _table_csv(table: Table) -> str:
     return csv_text(table.file_columns, table.file_rows)
+
+
+def _add_places(folder: Path, package: Path) -> None:
+    """Put the ranked places that `lidarplan place` has left in the same folder into the GeoPackage too, as a layer."""
+    from planner.placement.write import PLACES
+
+    if (found := folder / PLACES).is_file():
+        import pyogrio
+
+        pyogrio.write_dataframe(
+            pyogrio.read_dataframe(found), package, layer="places", driver="GPKG", append=True
+        )
 
 
 def _write_instrument(plan: Plan, folder: Path, kind: Kind) -> None:

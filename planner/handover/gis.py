@@ -70,6 +70,8 @@ def write_kmz(layers: "dict[str, GeoDataFrame]", site: Site, path: Path) -> None
     for name, layer in layers.items():
         shown = _lifted(layer.to_crs(WGS84), lift_m).rename(columns={"name": "Name"})
         shown["altitudeMode"] = "absolute"
+        if "height_datum" in shown:
+            shown["height_datum"] = "above_sea_level"
         shown["OGR_STYLE"] = [_style(name, row) for row in shown.to_dict("records")]
         pyogrio.write_dataframe(shown, document, layer=name, driver="LIBKML", append=document.exists())
     # GDAL loses the layers of a KMZ that it appends to; a KMZ is a KML in a zip

@@ -16,6 +16,7 @@ from geometry.beams import unit_vector
 from geometry.projection import projection_of
 from geometry.wakes import wake_outline_m
 from planner.exclusion import Exclusion
+from planner.nouns import Noun
 from planner.places import Places
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
@@ -96,6 +97,8 @@ def _lidar(site: Site, number: int) -> tuple[Sequence[float], Record]:
         "azimuth_offset_deg": lidar.azimuth_offset_deg,
         "elevation_offset_deg": lidar.elevation_offset_deg,
         **lidar.mounting.model_dump(),
+        "lidar_uncertainty": _stated(lidar.uncertainty),
+        "signal": _stated(lidar.signal),
         "number": number,
     }
     return lidar.position, record
@@ -108,6 +111,12 @@ def _instrument(lidar: Lidar) -> str:
     return json.dumps(lidar.instrument.model_dump(mode="json", exclude_unset=True))
 
 
+def _stated(noun: Noun | None) -> str | None:
+    """What a part of a lidar says beyond its defaults, as JSON; None where that is nothing."""
+    stated = {} if noun is None else noun.model_dump(mode="json", exclude_defaults=True)
+    return json.dumps(stated) if stated else None
+
+
 def _plain(role: str, item: Any, *, rename: dict[str, str] | None = None) -> Record:
     """All fields of a noun but its position; what is not given stays away if nothing of the layer gives it."""
     names = rename or {}
@@ -118,7 +127,8 @@ def _plain(role: str, item: Any, *, rename: dict[str, str] | None = None) -> Rec
 def _points(site: Site, rows: "Sequence[tuple[Sequence[float], Record]]") -> "GeoDataFrame":
     import shapely
 
-    return _frame(site, [(shapely.Point(*position), record) for position, record in rows])
+    datum = {"height_datum": site.height_datum, "geoid_undulation_m": site.geoid_undulation_m}
+    return _frame(site, [(shapely.Point(*position), {**record, **datum}) for position, record in rows])
 
 
 def _frame(site: Site, rows: "Sequence[tuple[BaseGeometry, Record]]") -> "GeoDataFrame":

@@ -33,8 +33,8 @@ def require_accumulation(layout: ScanLayout, step_s: float, why: str) -> int:
     return round(steps)
 
 
-def require_gates(layout: ScanLayout, most: int, what: str) -> Gates:
-    """Give a scan's gates: it must have some, and no more than a file or the instrument takes.
+def require_gates(layout: ScanLayout, most: int | None, what: str) -> Gates:
+    """Give a scan's gates: it must have some, and no more than a file (`most`) or the instrument takes, where known.
 
     Raises
     ------
@@ -44,10 +44,10 @@ def require_gates(layout: ScanLayout, most: int, what: str) -> Gates:
     if layout.gates is None:
         raise InputError(
             f"scan '{layout.name}': no gates are declared, and {what} needs them; add "
-            "gates: {first_m: ..., spacing_m: ..., count: ...} to the scan"
+            "gates: {first_m: ..., spacing_m: ..., count: ...} to the scan, or export with --gates FIRST,SPACING,COUNT"
         )
-    limit = min(most, layout.lidar.device.max_gates or most)
-    if layout.gates.count > limit:
+    limits = [limit for limit in (most, layout.lidar.device.max_gates) if limit is not None]
+    if limits and layout.gates.count > (limit := min(limits)):
         raise InputError(
             f"scan '{layout.name}': {layout.gates.count} gates came; {what} takes {limit} at most. "
             "Make the spacing wider or the stretch shorter."

@@ -11,6 +11,7 @@ from planner.placement.ranking import Placement, Ranked
 from planner.placement.search import UNSEEN
 
 TURBULENT = ("turbulent_speed_std_mps", "turbulent_direction_std_deg")
+PLACES = "places.gpkg"
 UNIT = {"vector": "m/s", "speed": "m/s", "direction": "deg"}
 
 
@@ -88,6 +89,20 @@ def layers(found: Placement) -> dict[str, FloatArray]:
     return {name: values.reshape(shape) for name, values in maps.items()}
 
 
+def sight_layers(found: Placement) -> dict[str, FloatArray]:
+    """For each target a map (row, column) of how far a head stands above what it needs to see it over the terrain [m].
+
+    Negative: by so much it would have to be raised; NaN: not known. Empty without a terrain.
+    """
+    if found.task.terrain is None:
+        return {}
+    slack = found.seen.slack["terrain"]
+    return {
+        f"{name}_m": values.reshape(found.grid.shape)
+        for name, values in zip(found.task.targets, slack, strict=True)
+    }
+
+
 def least_slack(seen: Look) -> dict[str, FloatArray]:
     """(place,) what is left over of each criterion at the target where it is least; NaN where it is not known."""
     return {name: np.asarray(values.min(axis=0)) for name, values in seen.slack.items()}
@@ -152,10 +167,12 @@ def write_geopackage(found: Placement, folder: Path) -> str:
         for row in rows_of(found)
         for place in _places(row)
     ]
-    points = gpd.points_from_xy([r["easting_m"] for r in rows], [r["northing_m"] for r in rows])
+    points = gpd.points_from_xy(
+        *([row[key] for row in rows] for key in ("easting_m", "northing_m", "height_m"))
+    )
     table = gpd.GeoDataFrame(rows, geometry=points, crs=found.task.site.crs)
-    table.to_file(folder / "places.gpkg", layer="places", driver="GPKG")
-    return "places.gpkg"
+    table.to_file(folder / PLACES, layer="places", driver="GPKG")
+    return PLACES
 
 
 def _places(row: dict[str, object]) -> list[dict[str, object]]:
@@ -176,10 +193,11 @@ def write_all(found: Placement, folder: Path) -> tuple[list[str], str | None]:
     from planner.files.raster import write_geotiff
 
     names = [*write_tables(found, folder), write_geopackage(found, folder)]
+    rasters = {"maps.tif": layers(found), "sight.tif": sight_layers(found)}
+    rasters = {name: bands for name, bands in rasters.items() if bands}
     try:
-        write_geotiff(
-            folder / "maps.tif", layers(found), found.grid.east_m, found.grid.north_m, found.task.site.crs
-        )
+        for name, bands in rasters.items():
+            write_geotiff(folder / name, bands, found.grid.east_m, found.grid.north_m, found.task.site.crs)
     except UnavailableError as error:
         return names, str(error)
-    return [*names, "maps.tif"], None
+    return [*names, *rasters], None

@@ -1,6 +1,6 @@
 """Rays from the reference study's database: SQLite files, MariaDB and MySQL."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,9 @@ from reconstruct.formats.gate_table import gate_table
 from reconstruct.formats.options import Options
 from reconstruct.formats.over_the_top import folded
 from reconstruct.formats.text import seconds_delta, utc_from_labview
-from reconstruct.losses import Loss
+from reconstruct.formats.time_order import time_order
+from reconstruct.formats.wind_lines import EARLIEST_S, LATEST_S, LONGEST_RAY_S
+from reconstruct.losses import Loss, merged_losses
 from reconstruct.records import Records, join
 from reconstruct.sweep_ids import sweep_ids
 from reconstruct.sweep_lag import estimate_lead, evened, without_lead
@@ -129,7 +131,9 @@ def _attitude(
     )
     if frame.empty:
         return {}
-    frame = frame[["dt", "head", "pitch", "roll"]].astype(float).dropna().sort_values("dt")
+    frame = frame[["dt", "head", "pitch", "roll"]].apply(pd.to_numeric, errors="coerce").astype(float)
+    frame = frame.dropna().sort_values("dt")
+    frame["head"] = np.unwrap(frame["head"], period=360.0)  # between 359 and 1 degree lies north, not south
     return {str(name): frame[name].to_numpy() for name in frame.columns} if len(frame) else {}
 
 
@@ -147,7 +151,10 @@ def _fetched(
     control, ray_query = select("control", held["control"])
     values, value_query = select("measurement", held["measurement"])
     key, other = control.c[held["control"]["gw_id"]], values.c[held["measurement"]["gw_id"]]
-    ray_query = ray_query.where(control.c[held["control"]["scn_id"]] == scenario).order_by(key).limit(rays)
+    ray_query = ray_query.where(control.c[held["control"]["scn_id"]] == scenario)
+    nameless = len(connection.execute(ray_query.where(key.is_(None))).all())
+    untold = [Loss("control", "a ray without a gw_id", times=nameless)] if nameless else []
+    ray_query = ray_query.where(key.is_not(None)).order_by(key).limit(rays)
     last: int | None = None
     gate: float | None = None
     while True:
@@ -164,7 +171,9 @@ def _fetched(
         measured = _frame(connection, within, held["measurement"])
         records = _records(found, measured[measured["gw_id"].isin(found["gw_id"])], attitude, options)
         if records.rays:
-            yield replace(records, instrument=name).mounted(options.mounting)
+            losses = merged_losses([*records.losses, *untold])
+            untold = []
+            yield replace(records, instrument=name, losses=losses).mounted(options.mounting)
 
 
 def _nearest_gate(
@@ -180,34 +189,58 @@ def _nearest_gate(
 def _frame(
     connection: "sa.Connection", query: "sa.Select[tuple[object, ...]]", columns: dict[str, str]
 ) -> pd.DataFrame:
-    """Rows of a query as numbers; a NULL is NaN."""
+    """Rows of a query as numbers; a NULL, a text that is no number and a value without end are NaN."""
     streamed = connection.execution_options(stream_results=True, yield_per=CHUNK_ROWS).execute(query)
-    parts = [
-        [np.array(column, dtype=float) for column in zip(*rows, strict=True)]
-        for rows in streamed.partitions()
-    ]
+    parts = [[_numbers(column) for column in zip(*rows, strict=True)] for rows in streamed.partitions()]
     names = list(columns)
     if not parts:
         return pd.DataFrame({name: np.empty(0) for name in names})
     return pd.DataFrame({name: np.concatenate([part[i] for part in parts]) for i, name in enumerate(names)})
 
 
+def _numbers(column: Sequence[object]) -> FloatArray:
+    """A column as numbers; NaN where it holds none."""
+    try:
+        values = np.array(column, dtype=float)
+    except (TypeError, ValueError):  # SQLite takes a text in any column
+        values = np.array(pd.to_numeric(np.array(column, dtype=object), errors="coerce"), dtype=float)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _usable(control: pd.DataFrame, measured: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, list[Loss]]:
+    """Rays with a time, angles and measurements, in the order of time, and what is left out."""
+    lasts = control["dt_stop"] - control["dt_start"]
+    sound = control[["dt_start", "dt_stop", "azim", "elev"]].notna().all(axis=1)
+    sound &= control["dt_start"].between(EARLIEST_S, LATEST_S) & lasts.between(0.0, LONGEST_RAY_S)
+    sound &= control["elev"].abs() <= 360.0
+    sound &= control["gw_id"].isin(measured["gw_id"].unique())
+    ranged = measured["dist"] >= 0
+    first = ~control["gw_id"].duplicated()
+    rules = (
+        ("control", "a ray without time, angles or measurement", int((~sound).sum())),
+        ("control", "a ray with the gw_id of one before", int((sound & ~first).sum())),
+        ("measurement", "a value without a distance", int((~ranged).sum())),
+    )
+    losses = [Loss(table, text, times=times) for table, text, times in rules if times]
+    control, measured = control[sound & first], measured[ranged]
+    control = control[control["gw_id"].isin(measured["gw_id"].unique())]
+    control = control.sort_values("gw_id", kind="stable")
+    middle = (control["dt_start"] + control["dt_stop"]).to_numpy(dtype=float) / 2
+    sorted_ = time_order(utc_from_labview(middle), "control")
+    control = control.iloc[sorted_.order]
+    return control, measured[measured["gw_id"].isin(control["gw_id"])], [*losses, *sorted_.losses]
+
+
 def _records(
     control: pd.DataFrame, measured: pd.DataFrame, attitude: dict[str, FloatArray], options: Options
 ) -> Records:
     """Rays in our convention."""
-    known = control[["gw_id", "dt_start", "dt_stop", "azim", "elev"]].notna().all(axis=1)
-    listed = measured["gw_id"].unique()
-    whole = known & control["gw_id"].isin(listed)
-    losses = (
-        []
-        if whole.all()
-        else [Loss("control", "a ray without time, angles or measurement", times=int((~whole).sum()))]
-    )
-    control = control[whole].drop_duplicates("gw_id").sort_values("gw_id", kind="stable")
-    measured = measured[measured["gw_id"].isin(control["gw_id"]) & measured["dist"].notna()]
+    control, measured, losses = _usable(control, measured)
     grid = gate_table(measured, ray=["gw_id"], gate="dist", values=("radSpeed", "cnr", "disp"))
-    control = control[control["gw_id"].isin(grid.first["gw_id"])]
+    if grid.doubles:
+        losses.append(Loss("measurement", "a gw_id and distance that come twice", times=grid.doubles))
+    place = np.searchsorted(grid.first["gw_id"].to_numpy(dtype=float), control["gw_id"].to_numpy(dtype=float))
+    grids = {name: values[place] for name, values in grid.grids.items()}
     start, stop = control["dt_start"].to_numpy(dtype=float), control["dt_stop"].to_numpy(dtype=float)
     middle = start + (stop - start) / 2
     azimuth, elevation, notes = folded(control["azim"], control["elev"])
@@ -216,23 +249,21 @@ def _records(
         for name, own in (("heading_deg", "head"), ("pitch_deg", "pitch"), ("roll_deg", "roll"))
     }
     time = utc_from_labview(middle) + seconds_delta(options.clock_offset_s)
-    order = np.argsort(time, kind="stable")
-    records = Records(
-        time_utc=np.sort(time),
+    return Records(
+        time_utc=time,
         duration_s=stop - start,
         azimuth_deg=azimuth,
         elevation_deg=elevation,
         scan_id=control["scn_id"].to_numpy(dtype=np.intp),
         sweep_id=np.zeros(len(control), dtype=np.intp),
         range_m=np.round(grid.range_m * METRES_IN_DECAMETRE, 6),
-        radial_speed_mps=-grid.grids["radSpeed"],
-        cnr_db=grid.grids["cnr"],
-        spectral_width_mps=grid.grids["disp"] if "disp" in measured else None,
+        radial_speed_mps=-grids["radSpeed"],
+        cnr_db=grids["cnr"],
+        spectral_width_mps=grids["disp"] if "disp" in measured else None,
         notes=(*_NOTES, *notes),
         losses=tuple(losses),
         **logged,
     )
-    return replace(records.at_rays(order), time_utc=time[order])
 
 
 def _whole_sweeps(parts: Iterator[Records], rays: int) -> Iterator[Records]:

@@ -56,18 +56,38 @@ def write_aas(
         return
     with connected(place, write=True) as connection:
         create_tables(connection)
-        start = _next_gateway(connection)
-        taken = set(scenario_numbers(connection, held_columns(connection), None)) & set(
-            np.unique(records.scan_id).tolist()
+        append_aas(
+            connection,
+            records,
+            scan_type=scan_type,
+            pulse_ns=pulse_ns,
+            fft_points=fft_points,
+            position=position,
         )
-        if taken:
-            raise InputError(
-                f"the database already holds scenario {min(taken)}: give the records another scan_id"
-            )
-        gateway = np.arange(start, start + records.rays)
-        _write_rays(connection, records, gateway, position)
-        _write_measurements(connection, records, gateway)
-        _write_scenarios(connection, records, gateway, scan_type, pulse_ns, fft_points)
+
+
+def append_aas(
+    connection: "sa.Connection",
+    records: Records,
+    *,
+    scan_type: ScanType,
+    pulse_ns: float,
+    fft_points: int,
+    position: tuple[float, float, float] | None = None,
+) -> None:
+    """As `write_aas`, in the transaction of a connection to a database that has the tables."""
+    taken = set(scenario_numbers(connection, held_columns(connection), None)) & set(
+        np.unique(records.scan_id).tolist()
+    )
+    if taken:
+        raise InputError(
+            f"the database already holds scenario {min(taken)}: give the records another scan_id"
+        )
+    start = _next_gateway(connection)
+    gateway = np.arange(start, start + records.rays)
+    _write_rays(connection, records, gateway, position)
+    _write_measurements(connection, records, gateway)
+    _write_scenarios(connection, records, gateway, scan_type, pulse_ns, fft_points)
 
 
 def _next_gateway(connection: "sa.Connection") -> int:

@@ -76,6 +76,8 @@ def _numbers(column: "pd.Series[str]", where: str, name: str) -> tuple["pd.Serie
     """A text column as numbers, if most of it is; else as it is."""
     numbers = pd.to_numeric(column, errors="coerce")
     wrong = (numbers.isna() & column.notna()).to_numpy()
+    if not wrong.any():
+        return numbers, []
     if wrong.mean() > 0.5:
         return column, []  # type: ignore[return-value]
     what = f"{str(column[wrong].iloc[0])[:20]!r} in {name} is no number"

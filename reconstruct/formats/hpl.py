@@ -101,7 +101,7 @@ def read_hpl(path: Path, options: Options | None = None) -> Records:
             *turned,
             *sorted_.notes,
         ),
-        losses=merged_losses([*found.losses, *sorted_.losses]),
+        losses=merged_losses([*header.losses, *found.losses, *sorted_.losses]),
     )
     return _timed(records, header, options).mounted(options.mounting)
 
@@ -164,8 +164,20 @@ def _whole(values: FloatArray, gates: int, cut: BoolArray) -> IntArray:
     sound &= (np.abs(azimuth) < MOST_TURNED_DEG) & (np.abs(elevation) <= 360.0)
     sound &= np.isfinite(values[ray, 3]) == np.isfinite(values[ray, 4])
     ray = ray[sound]
+    ray = ray[~_doubtful(values[:, 0], ray, gates)]
     apart = np.concatenate([[True], np.diff(ray) > gates]) if len(ray) else np.empty(0, dtype=bool)
     return np.asarray(ray[apart], dtype=np.intp)
+
+
+def _doubtful(number: FloatArray, ray: IntArray, gates: int) -> BoolArray:
+    """(ray,) that two ray lines begin, or whose gates a gate line follows that comes again: which of the two
+    is the ray's own is unknown.
+    """
+    around = np.concatenate([[np.nan], number, [np.nan, np.nan]])
+    before, after, then = around[ray], around[ray + gates + 2], around[ray + gates + 3]
+    hours_before = before % 1 > 0
+    gate_again = (after % 1 == 0) & (after >= 0) & (after < gates) & (then != 0) & (then != 1)
+    return np.asarray(hours_before | gate_again)
 
 
 def _cut(rows: NumberRows, body: bytes) -> BoolArray:
@@ -181,6 +193,8 @@ def _cut(rows: NumberRows, body: bytes) -> BoolArray:
 
 def _usual_gates(number: FloatArray) -> int:
     """How many gate lines mostly follow each other; 0 if none does."""
+    if not len(number):
+        return 0
     starts = np.flatnonzero(np.concatenate([[True], np.diff(number) != 1, [True]]))
     lengths = np.diff(starts)[(number[starts[:-1]] == 0) | (number[starts[:-1]] == 1)]
     return int(np.bincount(lengths).argmax()) if len(lengths) else 0

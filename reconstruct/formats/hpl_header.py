@@ -14,6 +14,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import InputError
+from reconstruct.losses import Loss
 
 #: A header has 17 lines; an end further down is no end of a header.
 HEADER_LINES = 60
@@ -21,6 +22,7 @@ HEADER_LINES = 60
 #: More gates than any instrument has: the longest files known have 4000.
 MOST_GATES = 20_000
 
+_DATA = re.compile(r"\s*[-+]?\d+(?:[.,]\d+)?(?:\s+[-+\d.,eE]+){2,}\s*")
 _START = re.compile(r"(\d{4})(\d{2})(\d{2})\s+(\d{1,2}):(\d{2}):(\d{2}(?:\.\d+)?)")
 _NAME_DATE = re.compile(r"_(\d{4})(\d{2})(\d{2})_(\d{2})(\d{2})?(\d{2})?")
 _OVERLAPPING = re.compile(r"(?<!non)(?<!non[- ])overlapping")
@@ -40,6 +42,7 @@ class Header:
     spacing_m: float  # from centre to centre
     system: str = ""
     notes: tuple[str, ...] = ()
+    losses: tuple[Loss, ...] = ()
 
     @property
     def midnight(self) -> Any:
@@ -67,6 +70,7 @@ def read_header(lines: list[str], path: Path) -> tuple[Header, int]:
         )
     pairs = [line.partition(":") for line in lines[:end] if ":" in line]
     said = {name.strip().lower(): value.strip() for name, _, value in pairs}
+    numbers = [n for n, line in enumerate(lines[:end]) if _DATA.fullmatch(line)]
     gates = _number(said, "number of gates", path)
     length = _number(said, "range gate length (m)", path)
     points = _number({"gate length (pts)": "1", **said}, "gate length (pts)", path)
@@ -87,6 +91,10 @@ def read_header(lines: list[str], path: Path) -> tuple[Header, int]:
         spacing_m=spacing_m,
         system=f"HALO {said.get('system id', '')}".strip(),
         notes=(*notes, *overlap),
+        losses=tuple(
+            Loss(path.name, "a line of numbers before the end of the header", numbers[0] + 1, len(numbers))
+            for _ in numbers[:1]
+        ),
     ), end + 1
 
 
@@ -104,7 +112,8 @@ def _gates(lines: list[str], scan: str, length: float, points: float) -> tuple[f
 
 def _number(said: dict[str, str], name: str, path: Path) -> float:
     try:
-        value = float(said[name].replace(",", "."))
+        text = said[name].replace(",", ".")
+        value = float("nan" if "_" in text else text)
     except (KeyError, ValueError):
         value = float("nan")
     if not np.isfinite(value):

@@ -86,7 +86,9 @@ def read_nacelle(path: Path, options: Options | None = None) -> Records:
         azimuth_deg=azimuth,
         elevation_deg=elevation,
         scan_id=lines,
-        sweep_id=np.zeros(len(lines), dtype=np.intp),
+        sweep_id=np.cumsum(
+            np.diff(lines, prepend=lines[:1]) < 0
+        ),  # a pass ends where the first line comes again
         range_m=table.range_m,
         radial_speed_mps=-table.grids["RWS"],
         cnr_db=table.grids["CNR"],

@@ -70,10 +70,15 @@ def byte_lines(body: bytes) -> list[bytes]:
 
 
 def _parsed(body: bytes, columns: int) -> FloatArray | None:
-    """(line, column) numbers; None if something in the text is none."""
+    """(line, column) numbers; None if something in the text is none.
+
+    A first line of its own tells the parser how long lines are: by a longer one of the file it would take the
+    first numbers of every line for a name, and warn only.
+    """
+    longest = b"0 " * columns + b"\n"
     try:
         frame = pd.read_csv(
-            io.BytesIO(body),
+            io.BytesIO(longest + body),
             sep=r"\s+",
             header=None,
             names=list(range(columns)),
@@ -85,7 +90,7 @@ def _parsed(body: bytes, columns: int) -> FloatArray | None:
         )
     except (ValueError, OverflowError, pd.errors.ParserError):
         return None
-    values = frame.to_numpy(dtype=float)
+    values = frame.to_numpy(dtype=float)[1:]
     return None if np.isinf(values).any() else values
 
 

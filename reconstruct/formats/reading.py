@@ -16,7 +16,7 @@ from reconstruct.formats.hpl import read_hpl
 from reconstruct.formats.nacelle import read_nacelle, spelled
 from reconstruct.formats.options import Options
 from reconstruct.formats.plain_csv import read_plain_csv
-from reconstruct.formats.text import decode, read_bytes, split_lines
+from reconstruct.formats.text import BLANK, decode, read_bytes, split_lines
 from reconstruct.formats.wind_lines import EARLIEST_S
 from reconstruct.formats.windscanner import read_windscanner
 from reconstruct.losses import Loss, losses_text, merged_losses
@@ -139,7 +139,7 @@ def _start(path: Path) -> bytes:
             raw = file.read(LOOKED_AT)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error})") from error
-    return raw if raw.strip() else read_bytes(path)
+    return raw if raw.strip(BLANK) else read_bytes(path)
 
 
 def _detect_text(lines: list[str]) -> Kind | Literal["companion"] | None:

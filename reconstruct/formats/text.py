@@ -27,6 +27,9 @@ RARE_SHARE = 0.02
 #: Seconds that nanoseconds can count are fewer than this; a damaged number may be more.
 LATEST_S = 9.0e9
 
+#: Bytes that say nothing: a file of nothing else is empty.
+BLANK = b"\x00 \t\r\n\xef\xbb\xbf"
+
 #: How much of a damaged line an error shows.
 SHOWN_CHARACTERS = 40
 
@@ -52,7 +55,7 @@ def read_bytes(path: Path) -> bytes:
             raw = gzip.decompress(raw)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read ({error})") from error
-    if not raw.strip(b"\x00 \t\r\n\xef\xbb\xbf"):
+    if not raw.strip(BLANK):
         raise InputError(f"{path}: the file is empty")
     return raw
 

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from geometry.beams import unit_vector
 from geometry.gates import Probe
 from reconstruct.field import synthesise
-from reconstruct.flight import Sampling, reach_m, subgrid_root
+from reconstruct.flight import Sampling, reach_m
 from reconstruct.monte_carlo import (
     Air,
     Scene,
@@ -105,9 +105,7 @@ def bench_turbulent() -> None:
     synthesise(AIR, extent, rng=rng)
     print(f"memory while it is made: {tracemalloc.get_traced_memory()[1] / 1e6:.0f} MB")
     tracemalloc.stop()
-    start = time.perf_counter()
-    air = Air(field, 0.72, subgrid_root(*scene, AIR, field.cut_per_m))
-    print(f"share of the subgrid eddies in 60 rays: {time.perf_counter() - start:.2f} s")
+    air = Air(field, 0.72)
     sine_s = best_s(lambda: np.sin(np.linspace(0.0, 100.0, 3_000_000)), 3)
     settings = Settings(sampling=Sampling(probe_points=5, sweep_points=1))
     shifts = spread_shifts_m(field, 200, rng)
@@ -132,7 +130,7 @@ def full_run(realisations: int = 256) -> None:
     )
     print(f"{realisations} x 6 x ten minutes: {time.perf_counter() - start:.0f} s")
     for scene, simulation in zip(scenes, found, strict=True):
-        print(f"{scene.rays.count} rays, wind {scene.wind.from_deg:g}, box share {simulation.box_share:.3f}")
+        print(f"{scene.rays.count} rays, wind {scene.wind.from_deg:g}")
         for name, value in vars(judge(simulation)).items():
             estimates = [value] if isinstance(value, Estimate) else value
             shown = [f"{estimate.value:9.4f} +- {estimate.standard_error:.4f}" for estimate in estimates]

@@ -28,7 +28,7 @@ from reconstruct.waves import long_share  # noqa: E402
 from reconstruct.wind import WindState  # noqa: E402
 
 PERIOD_S = 600.0
-OF_PERIOD = (2.0, 8.0, 8.0)  # wavenumber times L up to which the box is summed, along the wind, left, up
+OF_PERIOD = (2.0, 10.0, 10.0)  # wavenumber times L up to which the box is summed, along the wind, left, up
 OF_SCAN = (14.0, 14.0, 14.0)
 LONGEST_M, SHORTEST_M = 6e5, 4.0  # of the integrals over the spectrum, 2 pi over the wavenumber
 DRAWN = 200_000  # waves of those integrals
@@ -89,9 +89,7 @@ def kept(air: Turbulence, size_m: FloatArray, lengths: tuple[float, float, float
         each = space * power(air, wave, seen(wave))
         whole += float(np.sum(each))
         summed = np.all(np.abs(wave) < edge[:, None], axis=0)
-        outside += float(
-            np.sum(each * np.where(summed, long_share(air, np.linalg.norm(wave, axis=0)), 1.0))
-        )
+        outside += float(np.sum(each * np.where(summed, long_share(air, np.linalg.norm(wave, axis=0)), 1.0)))
     return Share((inside + outside) / whole, whole)
 
 

@@ -134,6 +134,17 @@ AIRS = (
             "30°, 45° off": (sector(15, 2.0), 45.0),
         },
     ),
+    Air(
+        Turbulence(0.09, 170.0, "mann"),
+        8.0,
+        0.0,
+        8.0,
+        {
+            "60°, along, Mann": (sector(30, 2.0), 0.0),
+            "60°, across, Mann": (sector(30, 2.0), 90.0),
+            "14°, 45° off, Mann": (sector(7, 2.0), 45.0),
+        },
+    ),
 )
 
 

@@ -140,3 +140,30 @@ def test_many_beams_pass_solids_as_far_as_dense_sampling_says():
         assert near.sum() > 5
         assert np.abs(found - dense)[near].max() < 0.2
         assert np.all(found <= dense + 0.01)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_nearest_pass_and_the_entry_are_those_of_dense_sampling(seed):
+    """Every 0.2 m along 40 beams: where height over distance is least, and where the ground is first met."""
+    raster, rng = rough(60, 70, seed), np.random.default_rng(seed)
+    spots = rng.uniform([30, 30], [1370, 1170], (40, 2, 2))
+    ground = raster.heights_m(spots[..., 0], spots[..., 1])
+    beams = np.concatenate([spots, (ground + rng.uniform(2, 40, ground.shape))[..., None]], axis=-1)
+    near = nearest_pass(raster, beams[:, 0], beams[:, 1])
+    entry = terrain_sight(raster, beams[:, 0], beams[:, 1]).entry_m[:, 0]
+    met, heights = 0, raster.height_m  # inside a cell the ground bulges by up to a sixteenth of its twist
+    twist = np.abs(heights[1:, 1:] + heights[:-1, :-1] - heights[1:, :-1] - heights[:-1, 1:]).max()
+    for number, (head, end) in enumerate(beams):
+        span = np.hypot(*(end - head)[:2])
+        way = np.arange(0.2, span, 0.2)
+        points = head + way[:, None] / span * (end - head)
+        above = points[:, 2] - (1 - 0.13) * way * (span - way) / (2 * EARTH_M)
+        above = above - raster.heights_m(points[:, 0], points[:, 1])
+        slope = near.clearance_m[number] / near.distance_m[number]
+        assert abs(slope - np.min(above / way)) * near.distance_m[number] < twist / 16
+        below = np.flatnonzero(above < 0)
+        deep = below.size and above[below].min() < -1.0
+        assert abs(way[below[0]] - entry[number]) < 5.0 if deep else True
+        assert below.size or np.isnan(entry[number]) or above.min() < 0.05
+        met += below.size > 0
+    assert 5 < met < 35

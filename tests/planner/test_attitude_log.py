@@ -133,7 +133,7 @@ def test_the_drift_is_reported_whether_it_is_followed_or_not(clean: Path, use: s
     assert table["angle"].tolist() == ["heading_deg", "pitch_deg"]
     assert table["per_day_deg"][0] == pytest.approx(PER_DAY, abs=1e-4)
     log = (clean.parent / "results" / "retrieve.log").read_text(encoding="utf-8")
-    assert "logged heading: 1.000 ± 0.000° a day over 432 means of ten minutes (significant at 5 %)" in log
+    assert "drift +1.000 ± 0.000° a day over 432 means of ten minutes (significant at 5 %)" in log
 
 
 def test_a_separate_log_is_followed_by_its_columns_and_signs(clean: Path) -> None:
@@ -143,7 +143,9 @@ def test_a_separate_log_is_followed_by_its_columns_and_signs(clean: Path) -> Non
     assert np.max(np.abs(error)) < 0.02
     _, error = run(clean, f"attitude: {{{columns}, heading: North, use: absolute}}")
     assert np.max(np.abs(error)) < 0.02
-    with pytest.raises(InputError, match="Yaw"):
+    with pytest.raises(
+        InputError, match="has the columns when, Yaw, Tilt, North; needed are time_utc and one of"
+    ):
         run(clean, f"attitude: {{path: {clean.parent / 'log.csv'}}}")
 
 

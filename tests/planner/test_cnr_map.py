@@ -1,10 +1,9 @@
 """CNR maps from plan to site file: the window holds the target, and planted offsets come back."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from geometry.angles import difference_deg
 from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
+from planner.cli import run
 from planner.cnr_fit import Drift, Mapped, drifts, fit_head, site_keys
 from planner.cnr_map import choose_targets, plan_map
 from planner.cnr_simulate import rehearse
@@ -24,8 +24,6 @@ from planner.hard_targets import sought
 from planner.places import Places
 from reconstruct.cnr_map import CnrMap
 from reconstruct.hard_target import find_target
-from reconstruct.record_tables import to_wide
-from reconstruct.records import Records
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBE = Probe(pulse_ns=200, window_ns=256)
@@ -206,7 +204,9 @@ def test_a_head_that_moved_between_two_tests_has_drifted(places: Places) -> None
     assert moved.is_significant
     assert moved.chance < 1e-6
     assert moved.azimuth_deg == pytest.approx(0.02, abs=0.004)
-    with pytest.raises(InputError, match="Between its first and last map tip N, tip E, tip S, tip W has moved"):
+    with pytest.raises(
+        InputError, match="Between its first and last map tip N, tip E, tip S, tip W has moved"
+    ):
         fit_head(places, "L", [*first, *turned[:4]], probe=PROBE)
 
 
@@ -259,49 +259,99 @@ def test_the_figure_of_a_map_is_a_picture(places: Places) -> None:
     assert cnr_map_figure(result.maps[0], PROBE.length_m).startswith(b"\x89PNG")
 
 
-def write_map(path: Path, found: CnrMap) -> None:
-    rays = found.azimuth_deg.size
-    records = Records(
-        time_utc=np.datetime64("2014-05-01T00:00:00", "ns") + np.arange(rays) * np.timedelta64(100, "ms"),
-        duration_s=np.full(rays, 0.1),
-        azimuth_deg=np.mod(found.azimuth_deg, 360.0),
-        elevation_deg=found.elevation_deg,
-        scan_id=np.zeros(rays, int),
-        sweep_id=np.zeros(rays, int),
-        range_m=found.range_m,
-        radial_speed_mps=np.zeros_like(found.cnr_db),
-        cnr_db=found.cnr_db,
-    )
-    to_wide(records).to_csv(path, index=False)
+# The commands
 
 
-def lidarplan(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from planner.cli import main; main()", *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=False)
+def said(capsys, *arguments: object) -> Any:
+    """The JSON of a command that goes well."""
+    assert run([*map(str, arguments), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
 
 
-def test_the_commands_plan_a_map_and_write_what_maps_tell_so_that_pointing_changes(
-    places: Places, site_file: Path
+def test_the_walk_of_the_example_from_plan_to_pointing_recovers_what_was_planted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    plan = json.loads(
-        lidarplan("cnr-map", "plan", str(site_file), "--lidar", "L", "--target", "tip S", "--json").stdout
-    )
-    assert plan["maps"][0]["time_s"] > 60
-    named = []
-    for number, (name, found) in enumerate(maps_of(places, 7)):
-        path = site_file.parent / f"map{number}.csv"
-        write_map(path, found)
-        named.append(f"{name}={path}")
-    refused = lidarplan("cnr-map", "fit", named[0], "--site", str(site_file), "--lidar", "L", "--write")
-    assert refused.returncode == 2
-    assert "do not determine" in refused.stderr
-    assert site_file.read_text(encoding="utf-8") == SITE
-    done = lidarplan("cnr-map", "fit", *named, "--site", str(site_file), "--lidar", "L", "--write", "--json")
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
-    assert document["site_keys"]["azimuth_offset_deg"] == pytest.approx(12.35, abs=0.01)
-    pointed = json.loads(lidarplan("point", str(site_file), "--json").stdout)
-    (row,) = [row for row in pointed if row["lidar"] == "L"]
-    wanted = planted(places).to_head(row["azimuth_true_deg"], row["elevation_deg"])
+    """Høvsøre: plan, simulate with .05° of heading, .03° of pitch and roll, fit --write, point: each within .01°."""
+    site = tmp_path / "site.yaml"
+    site.write_bytes((ROOT / "examples" / "hovsore" / "hard_target_test.yaml").read_bytes())
+    plan = said(capsys, "cnr-map", "plan", site, "--lidar", "WS_S", "--out", tmp_path / "rays")
+    best = plan["best_targets"]
+    assert len(best["targets"]) == 3
+    assert best["undetermined"] == []
+    rays = (tmp_path / "rays" / "tip_of_tower_N_rays.csv").read_text(encoding="utf-8").splitlines()
+    (tower,) = [item for item in plan["maps"] if item["target"] == "tip of tower N"]
+    assert len(rays) - 1 == tower["windows"][0]["rows"] * tower["windows"][0]["columns"]
+    truth = said(
+        capsys, "cnr-map", "simulate", site, "--lidar", "WS_S", "--out", tmp_path / "maps", "--seed", 3,
+        "--plant", "azimuth_offset_deg=0.05,pitch_deg=0.03,roll_deg=-0.03",
+    )  # fmt: skip
+    assert list(truth["maps"]) == best["targets"]
+    maps = [tmp_path / "maps" / name for name in truth["maps"].values()]
+    refused = run(["cnr-map", "fit", str(maps[0]), "--site", str(site), "--lidar", "WS_S", "--write"])
+    assert refused == 2
+    assert "do not determine" in capsys.readouterr().err
+    assert "12.31" in site.read_text(encoding="utf-8")
+    fit = said(capsys, "cnr-map", "fit", *maps, "--site", site, "--lidar", "WS_S", "--write")
+    assert fit["written"]
+    found = {angle["name"]: angle for angle in fit["angles"]}
+    for name, value in truth["mounting"].items():
+        if name in found:
+            assert abs(found[name]["value_deg"] - value) < 0.01
+    assert fit["range_offset_m"] == pytest.approx(0.0, abs=0.2)
+    (row,) = said(capsys, "point", site)
+    wanted = Mounting(**truth["mounting"]).to_head(row["azimuth_true_deg"], row["elevation_deg"])
     assert abs(float(difference_deg(row["azimuth_head_deg"], wanted[0]))) < 0.01
     assert abs(row["elevation_head_deg"] - float(wanted[1])) < 0.01
+
+
+def test_a_rehearsal_without_planting_draws_from_the_stated_uncertainty(places: Places) -> None:
+    """300 draws of heading and tilt scatter as the site file says; the same seed gives the same."""
+    drawn = [rehearse(places, "L", (), rng=np.random.default_rng(seed)).planted for seed in range(300)]
+    for name, std in (("azimuth_offset_deg", 0.05), ("pitch_deg", 0.03), ("elevation_offset_deg", 0.02)):
+        assert np.std([item[name] for item in drawn]) == pytest.approx(std, rel=0.15)
+    assert drawn[7] == rehearse(places, "L", (), rng=np.random.default_rng(7)).planted
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--plant", "yaw=1"), "--plant yaw came; allowed: heading_deg, pitch_deg"),
+        (("--plant", "pitch_deg=up"), "allowed: pitch_deg=NUMBER"),
+        (("--target", "tree"), "no hard target, mast or turbine is called 'tree'; allowed: tip N"),
+    ],
+)
+def test_what_cannot_be_rehearsed_is_told(site_file: Path, capsys, arguments, says) -> None:
+    out = site_file.parent / "maps"
+    assert run(["cnr-map", "simulate", str(site_file), "--lidar", "L", "--out", str(out), *arguments]) == 2
+    assert says in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_ground_in_the_window_is_told(site_file: Path) -> None:
+    """A stake of 0.5 m: what passes under it meets the plain before the gates end, and nothing above the horizon does."""
+    low = SITE.replace("height_m: 100, width_m: 1", "height_m: 0.5, width_m: 1")
+    plan = plan_map(Places(parse_site(low)), "L", "tip S")
+    assert plan.ground is not None
+    assert 0.2 < plan.ground.share < 0.6
+    assert -0.7 < plan.ground.up_to_deg < -0.6  # head elevation; the offset is 0.6
+    assert plan_map(Places(parse_site(SITE)), "L", "tip S").ground is None
+
+
+def test_a_hill_hides_a_target_and_it_is_not_chosen(tmp_path: Path, capsys) -> None:
+    """A ridge of 200 m before the southern mast: said with its name, and three others are taken."""
+    rasterio = pytest.importorskip("rasterio")
+    heights = np.full((40, 40), 4.8, dtype=np.float32)
+    heights[22:24] = 200.0  # northings 6255900 to 6256000, between the lidar and the southern mast
+    with rasterio.open(
+        tmp_path / "dem.tif", "w", driver="GTiff", width=40, height=40, count=1, dtype="float32", crs="EPSG:32632",
+        transform=rasterio.Affine(100, 0, 446000, 0, -100, 6258150),
+    ) as raster:  # fmt: skip
+        raster.write(heights, 1)
+    text = SITE.replace("ground_height_m: 4.8", "terrain: {file: dem.tif, height_datum: above_sea_level}")
+    path = tmp_path / "site.yaml"
+    path.write_text(text, encoding="utf-8")
+    plan = said(capsys, "cnr-map", "plan", path, "--lidar", "L", "--target", "tip S")
+    (planned,) = plan["maps"]
+    assert planned["hidden_by"] == ["the terrain"]
+    assert planned["ground"]["share"] == 1.0
+    assert "tip S" not in plan["best_targets"]["targets"]

@@ -13,7 +13,7 @@ from planner.figures.canvas import canvas
 from planner.figures.map_layers import most_lost
 from planner.figures.map_layers import scans as scan_layers
 from planner.figures.names import Name, draw_names, shown
-from planner.figures.sector_error import Published, TierCurve, sector_error
+from planner.figures.sector_error import TierCurve, sector_error
 from planner.figures.site_map import site_map
 from planner.figures.tradeoff import tradeoff_figure
 from planner.figures.wake_rose import rings, wake_rose
@@ -167,13 +167,6 @@ def test_panels_of_which_nothing_is_known_are_left_out() -> None:
     )
     assert four.shape[1] > 1.5 * one.shape[1] and four.shape[0] > 1.5 * one.shape[0]
     assert sector_error([curve()], title="nothing") is None
-
-
-def test_published_slopes_are_marked_beside_the_predicted() -> None:
-    predicted = [curve("turbulent", slope=[1.0, 0.98, 0.86]), curve("noise", slope=[1.0, 1.0, 1.0])]
-    measured = Published("published", np.array([60.0, 30.0]), np.array([0.998, 0.986]))
-    with_marks, without = (pixels(sector_error(predicted, title="s", published=p)) for p in (measured, None))
-    assert near(with_marks, EXCLUDED) > near(without, EXCLUDED) + 50
 
 
 def test_a_points_scan_has_its_rays_and_nothing_between_them() -> None:

@@ -3,6 +3,7 @@
 import json
 import zipfile
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -10,16 +11,20 @@ import numpy as np
 import pyogrio
 import pyproj
 import pytest
+import shapely
 
 from geometry.errors import InputError
 from planner.cli import run
+from planner.files.yaml_site import load_site
 from planner.handover.export import Choice, default_kinds, export
 from planner.handover.field_sheet import field_sheet_html, sight
 from planner.handover.gis_layers import layers
 from planner.plan import Plan
+from planner.report import report_html
 
 KML = "{http://www.opengis.net/kml/2.2}"
 ECEF = pyproj.Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True)
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 EVIL = "<script>alert(1)</script> & “=1+1” 風"
 
 
@@ -162,6 +167,25 @@ def test_kmz_of_ellipsoidal_heights_needs_the_geoid(moor, tmp_path):
     assert pyogrio.read_dataframe(tmp_path / "plan.kmz", layer="lidars").geometry[0].z == pytest.approx(17)
 
 
+@pytest.mark.parametrize("example", ["hovsore", "kassel"])
+def test_every_layer_of_both_examples_is_the_same_in_kmz_and_geopackage(example, request, tmp_path):
+    """GDAL reads both; every vertex of every geometry, brought to degrees by PROJ, within 1 mm."""
+    plan = request.getfixturevalue(example)
+    export(plan, tmp_path, ("gpkg", "kmz"))
+    to = pyproj.Transformer.from_crs(plan.site.crs, "EPSG:4326", always_xy=True)
+    names = [str(name) for name, _ in pyogrio.list_layers(tmp_path / "plan.gpkg")]
+    assert names == [str(name) for name, _ in pyogrio.list_layers(tmp_path / "plan.kmz")]
+    assert {"lidars", "targets", "beams", "crossings"} <= set(names)
+    for name in names:
+        ours = pyogrio.read_dataframe(tmp_path / "plan.gpkg", layer=name)
+        theirs = pyogrio.read_dataframe(tmp_path / "plan.kmz", layer=name)
+        assert list(ours["name"]) == list(theirs["Name"])
+        for one, other in zip(ours.geometry, theirs.geometry, strict=True):
+            east, north, height = shapely.get_coordinates(one, include_z=True).T
+            there = np.column_stack([*to.transform(east, north), height])
+            assert apart_m(shapely.get_coordinates(other, include_z=True), there).max() < 0.001
+
+
 def test_missing_gates_leave_out_the_instrument_files_only(kassel):
     """Kassel's scans have no gates: everything else is written, and the reason is told."""
     choice = default_kinds(kassel)
@@ -169,6 +193,7 @@ def test_missing_gates_leave_out_the_instrument_files_only(kassel):
     assert "windscanner" not in choice.kinds
     assert "field-sheet" in choice.kinds
     assert "no gates are declared" in choice.left_out[0]
+    assert "--gates FIRST,SPACING,COUNT" in choice.left_out[0]
 
 
 # The field sheet
@@ -254,6 +279,29 @@ def test_names_stay_text_on_the_sheet_and_in_the_kmz(moor, tmp_path):
         assert ElementTree.fromstring(packed.read("doc.kml")).find(f".//{KML}script") is None
 
 
+def test_sheet_says_how_far_to_search_and_which_targets_fix_the_head():
+    """The rehearsal at Høvsøre: three standard deviations of azimuth, and the same three targets as `cnr-map plan`."""
+    plan = Plan(load_site(EXAMPLES / "hovsore" / "hard_target_test.yaml"))
+    page = page_of(field_sheet_html(plan))
+    row = next(row for row in page.rows if row and row[0].startswith("tip of tower N"))
+    off_deg = np.hypot(0.02, 0.02) / 801.2 * 180 / np.pi / np.cos(np.deg2rad(11.5))
+    tilt_deg = 0.03 * np.tan(np.deg2rad(11.5))
+    std_deg = np.linalg.norm([0.05, 0.02, tilt_deg, off_deg])
+    assert float(row[-5]) == pytest.approx(3 * std_deg, abs=0.006)
+    assert "Map tip at stand 2, tip of tower N, tip of tower S" in " ".join(page.all)
+
+
+def test_report_holds_the_sheet_of_each_lidar(moor):
+    """The same page as alone, under its own heading; names stay text there too."""
+    lidar = {"name": EVIL, "position": [500000, 6250000, 10], "instrument": "windcube-200s"}
+    html = report_html([moor(lidars=[lidar], scans=[], pairs=[])])
+    page = page_of(html[html.index('id="sheets-1"') :])
+    assert page.tags.count("article") == 1
+    assert "script" not in page.tags
+    assert "Setting up" in page.all
+    assert any(EVIL in text for text in page.all)
+
+
 def test_sheet_needs_a_lidar(moor):
     """Said plainly."""
     with pytest.raises(InputError, match="no lidar"):
@@ -265,8 +313,6 @@ def test_sheet_needs_a_lidar(moor):
 
 def test_export_command_lists_what_it_wrote(tmp_path, capsys):
     """--json names every file; all of them are there, and nothing else."""
-    from pathlib import Path
-
     site = Path(__file__).resolve().parents[2] / "examples" / "hovsore" / "site.yaml"
     assert (
         run(["export", str(site), "--as", "csv,scan-table", "--out", str(tmp_path / "o"), "--json", "-q"])

@@ -13,11 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.errors import InputError
-from planner.handover.export import export
+from planner.cli import run
+from planner.files.yaml_site import load_site
+from planner.handover.export import export, with_gates
 from planner.handover.halo import halo_files, schedule_text, ssm_text
 from planner.handover.names import file_stem, file_stems
 from planner.handover.scan_table import scan_table, scan_table_csv
 from planner.handover.windscanner import motion_program, range_gate_table, windscanner_files
+from planner.plan import Plan
+from planner.scan_plans import GatePlan
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data" / "halo"
 GATES = {"first_m": 300, "spacing_m": 30, "count": 40}
@@ -84,6 +88,94 @@ def run_pmac(text):
         elif jog := re.fullmatch(r'CMD"#3j\^(\d+)"', line):
             triggers.append(int(jog.group(1)) / rate / 1e3)
     return moves, triggers
+
+
+class Replay:
+    """A motion program played through: where the head is at every moment, and when the laser is triggered.
+
+    What is known of the controller's language: a move of TM + TA milliseconds rises to its speed in TA and falls in TA;
+    lines are read on while it runs, but not past a DWELL, and a timer (I5111) is waited for; an angle is absolute.
+    """
+
+    def __init__(self, text):
+        lines = [line for line in text.split("\r\n") if line and not line.startswith(";")]
+        self.now_ms, self.moves, self.triggers = 0.0, [], []
+        self.end_ms = 0.0
+        self.rate_per_ms = float(next(line for line in lines if line.startswith("I322="))[5:])
+        start = lines.index("WHILE(P1001!=-78)")
+        self.here = self.angles(lines[start - 2])
+        self.begin = self.here
+        timer_ms = 0.0
+        for line in lines[start + 1 : -3]:
+            if timed := re.fullmatch(r"TA\((\d+)\)TM\((\d+)\)", line):
+                self.ramp_ms, self.move_ms = (float(part) for part in timed.groups())
+            elif line.startswith("X("):
+                self.move(self.angles(line))
+            elif dwell := re.fullmatch(r"DWELL([\d.]+)", line):
+                self.now_ms = max(self.now_ms, self.end_ms) + float(dwell.group(1))
+            elif waited := re.fullmatch(r"I5111=([\d.]+)\*8388608/I10", line):
+                timer_ms = float(waited.group(1))
+            elif line == "WHILE(I5111>0)":
+                self.now_ms += timer_ms
+            elif jog := re.fullmatch(r'CMD"#3j\^(\d+)"', line):
+                self.triggers.append((self.now_ms, int(jog.group(1)) / self.rate_per_ms))
+            else:
+                assert line == "ENDWHILE"
+
+    @staticmethod
+    def angles(line):
+        return np.array(
+            [float(value) for value in re.fullmatch(r"X\(([-.\d]+)\)Y\(([-.\d]+)\)", line).groups()]
+        )
+
+    def move(self, to):
+        start = max(self.now_ms, self.end_ms)
+        self.moves.append((start, self.ramp_ms, self.move_ms, self.here, to))
+        self.here, self.end_ms = to, start + self.ramp_ms + self.move_ms
+
+    def at(self, time_ms):
+        """Head angles at a moment: the way of a trapezium of speed."""
+        place = self.begin
+        for start, ramp, move, before, to in self.moves:
+            t = min(max(time_ms - start, 0.0), ramp + move)
+            if time_ms <= start:
+                break
+            rise = min(t, ramp) ** 2 / (2 * ramp)
+            level = min(max(t - ramp, 0.0), move - ramp)
+            late = max(t - move, 0.0)
+            place = before + (to - before) * (rise + level + late - late**2 / (2 * ramp)) / move
+        return place
+
+
+def direction(angles_deg):
+    """East, north, up of head azimuth and elevation, by hand."""
+    azimuth, elevation = np.deg2rad(angles_deg).T
+    level = np.cos(elevation)
+    return np.stack([np.sin(azimuth) * level, np.cos(azimuth) * level, np.sin(elevation)], axis=1)
+
+
+def require_replayed(layout):
+    """Every ray of a round, at the middle of its triggers, is where the plan has it, there and back."""
+    played = Replay(motion_program(layout))
+    scan, acc_ms = layout.scan, 1e3 * layout.spec.accumulation_s
+    azimuth, elevation = layout.mounting.to_head(scan.azimuth_deg, scan.elevation_deg)
+    planned = np.stack([np.asarray(azimuth) % 360, elevation], axis=1)
+    if scan.back_and_forth and scan.count > 1:
+        planned = np.concatenate([planned, planned[::-1]])
+    middles = [
+        start + (number + 0.5) * acc_ms
+        for start, length in played.triggers
+        for number in range(round(length / acc_ms))
+    ]
+    assert len(middles) == len(planned)
+    found = np.array([played.at(middle) for middle in middles])
+    apart = np.linalg.norm(
+        direction(found) - direction(planned), axis=1
+    )  # over the top an angle has two names
+    assert np.rad2deg(apart).max() < 0.001
+    for start, length in played.triggers:  # at rest, or at an even speed, from the first pulse to the last
+        inside = np.array([played.at(start + share * length) for share in np.linspace(0, 1, 9)])
+        assert np.abs(np.diff(inside, 2, axis=0)).max() < 1e-3
 
 
 # HALO
@@ -176,7 +268,6 @@ def test_schedule_never_runs_past_midnight():
         ({"accumulation_s": 0.55}, "0.5 or 0.6"),
         ({"pulse_ns": 200}, "no pulse of 200"),
         ({"step_deg": 30}, "60 °/s"),
-        ({"gates": {"first_m": 300, "spacing_m": 30, "count": 5000}}, "5000 gates"),
         ({"gates": {"first_m": 300, "spacing_m": 300, "count": 40}}, "10000 m at most"),
         ({"sweep": "forward"}, "back_and_forth"),
     ],
@@ -185,6 +276,29 @@ def test_halo_limits_are_told_before_anything_is_written(moor, scan, says):
     """The message says what came and what to do."""
     with pytest.raises(InputError, match=re.escape(says)):
         halo_files(halo_plan(moor, **sector(**scan)))
+
+
+def test_gates_are_limited_by_the_instrument_that_states_how_many_it_has(moor):
+    """No maker's number is known for the StreamLine: 320 gates pass; one that states 100 is held to them."""
+    gates = {"first_m": 300, "spacing_m": 30, "count": 320}
+    assert halo_files(halo_plan(moor, **sector(gates=gates)))
+    own = {
+        "name": "halo of ours",
+        "max_gates": 100,
+        "pulses": [{"pulse_ns": 350, "pulse_repetition_hz": 10000}],
+    }
+    lidar = {"name": "A", "position": [500000, 6250000, 10], "instrument": own}
+    scan = {
+        "name": "s",
+        "lidar": "A",
+        "target": "T",
+        "type": "stare",
+        "accumulation_s": 0.5,
+        "pulse_ns": 350,
+        "gates": gates,
+    }
+    with pytest.raises(InputError, match="320 gates came; halo of ours takes 100 at most"):
+        halo_files(moor(lidars=[lidar], scans=[scan], pairs=[]).layouts)
 
 
 def test_head_elevation_limit(moor):
@@ -228,6 +342,41 @@ def test_motion_program_sweeps_at_constant_speed_through_the_sector(hovsore):
         assert move - ramp == pytest.approx(12)
 
 
+def test_replayed_programs_are_where_the_plan_has_them_at_every_ray(hovsore, moor):
+    """The reference sector and stares, an RHI over the top, a raster in steps and a full circle, played through."""
+    for layout in hovsore.layouts:
+        require_replayed(layout)
+    lidar = {
+        "name": "A",
+        "position": [500000, 6250000, 10],
+        "instrument": "windscanner-200s",
+        "azimuth_offset_deg": 12.3,
+    }
+    spec = {"lidar": "A", "target": "T", "accumulation_s": 0.2, "gates": GATES}
+    scans = [
+        {
+            **spec,
+            "name": "slice",
+            "type": "rhi",
+            "elevation_from_deg": 20,
+            "elevation_to_deg": 160,
+            "step_deg": 4,
+        },
+        {**spec, "name": "raster", "type": "raster", "width_deg": 2, "height_deg": 1, "step_deg": 0.5},
+        {
+            **spec,
+            "name": "circle",
+            "type": "ppi",
+            "step_deg": 6,
+            "elevation_head_deg": 4,
+            "sweep": "back_and_forth",
+        },
+        {**spec, "name": "steps", **sector(motion="step")},
+    ]
+    for layout in moor(lidars=[lidar], scans=scans, pairs=[]).layouts:
+        require_replayed(layout)
+
+
 def test_points_program_visits_every_point(moor):
     """A list of targets: each ray at rest, in order, with its own triggers."""
     targets = [{"name": f"T{n}", "position": [500000 + 100 * n, 6251000, 110]} for n in range(4)]
@@ -240,6 +389,7 @@ def test_points_program_visits_every_point(moor):
     assert triggers == [0.5] * 4
     there = np.array([move[1] for move in moves])
     assert np.abs(np.mod(there[:, 0], 360) - plan.layouts[0].scan.azimuth_deg).max() < 1e-4
+    require_replayed(plan.layouts[0])
 
 
 @pytest.mark.parametrize(
@@ -260,6 +410,41 @@ def test_windscanner_limits_are_told_before_anything_is_written(moor, scan, says
     spec = {"name": "s", "lidar": "A", "target": "T", "accumulation_s": 0.5, "gates": GATES, **sector(**scan)}
     with pytest.raises(InputError, match=re.escape(says)):
         windscanner_files(moor(lidars=[lidar], scans=[spec], pairs=[]).layouts)
+
+
+def test_files_of_kassel_read_back_with_the_gates_that_the_command_gives(tmp_path, capsys):
+    """`export --gates` fills in what the example cannot say: every program plays through, every table has its gates."""
+    site = Path(__file__).resolve().parents[2] / "examples" / "kassel" / "site.yaml"
+    out = tmp_path / "out"
+    assert (
+        run(
+            [
+                "export",
+                str(site),
+                "--as",
+                "windscanner",
+                "--gates",
+                "200,50,100",
+                "--out",
+                str(out),
+                "--json",
+                "-q",
+            ]
+        )
+        == 0
+    )
+    files = [Path(name) for name in json.loads(capsys.readouterr().out)["files"]]
+    assert len(files) == 16
+    for path in files:
+        if path.name.endswith("_range_gates.txt"):
+            lines = [line.split("\t") for line in path.read_text(encoding="utf-8").splitlines()]
+            assert lines[:3] == [["LidarMode", "Long"], ["MaxDistance", "5150"], ["FFTSize", "128"]]
+            assert lines[3] == ["1", "2000", *(str(200 + 50 * gate) for gate in range(100))]
+    plan = Plan(with_gates(load_site(site), GatePlan(first_m=200.0, spacing_m=50.0, count=100)))
+    for layout in plan.layouts:
+        require_replayed(layout)
+    assert run(["export", str(site), "--gates", "200,50", "--out", str(tmp_path / "no")]) == 2
+    assert "three positive numbers" in capsys.readouterr().err
 
 
 # Scan table

@@ -33,6 +33,8 @@ SITE = {
             **{
                 "north": "grid",
                 "azimuth_offset_deg": 3.46,
+                "uncertainty": {"position_m": 0.02, "radial_speed_mps": 0.2},
+                "signal": {"cnr_db": -12.5, "range_m": 1000},
                 "mounting": {"heading_deg": 12.5, "pitch_deg": -0.1},
             },
         },
@@ -79,7 +81,7 @@ def site():
 def written(site, tmp_path_factory):
     """The site as a layout in every format, by our export or, where that has none, by GDAL."""
     folder = tmp_path_factory.mktemp("layouts")
-    export(Plan(site), folder, ("gpkg", "kmz", "csv"))
+    export(Plan(site), folder, ("gpkg", "kmz", "csv", "geojson"))
     tables = site_layers(site)
     together = pd.concat(list(tables.values()), ignore_index=True)
     pyogrio.write_dataframe(
@@ -88,6 +90,9 @@ def written(site, tmp_path_factory):
         driver="GeoJSON",
         layer_options={"RFC7946": "YES", "COORDINATE_PRECISION": "10"},
     )
+    (folder / "shapes").mkdir()
+    for name, table in tables.items():
+        table.rename(columns=lambda column: column[:10]).to_file(folder / "shapes" / f"{name}.shp")
     whole = folder / "lonely.kml"
     for name, table in tables.items():
         shown = table.to_crs(4326).rename(columns={"name": "Name"}).assign(altitudeMode="absolute")
@@ -106,13 +111,27 @@ def same(read: Site, site: Site) -> None:
                 assert np.abs(np.subtract(theirs[name].position, item.position)).max() < 0.001
 
 
-@pytest.mark.parametrize("name", ["layout.csv", "plan.gpkg", "plan.kmz", "all.geojson", "lonely.kml"])
+@pytest.mark.parametrize(
+    "name", ["layout.csv", "plan.gpkg", "plan.kmz", "geojson", "all.geojson", "lonely.kml", "shapes"]
+)
 def test_round_trip_loses_nothing(name, written, site):
     """Site -> file -> site file -> site: all fields, positions and heights within 1 mm."""
     path = written / name
     layout = load_layout(path, crs="EPSG:32632")
     same(layout_site(path, layout, "full"), site)
     same(parse_site(layout_text(path, layout, "full")), site)
+
+
+@pytest.mark.parametrize("name", ["plan.gpkg", "plan.kmz", "geojson", "layout.csv"])
+def test_heights_above_the_ellipsoid_stay_where_they_are(name, tmp_path):
+    """Every file says what its heights count from: above the ellipsoid they come back as they were, whatever KML needs."""
+    site = Site.model_validate({**SITE, "height_datum": "ellipsoidal", "geoid_undulation_m": 41.5})
+    export(Plan(site), tmp_path, ("gpkg", "kmz", "csv", "geojson"))
+    read = layout_site(tmp_path / name, load_layout(tmp_path / name, crs="EPSG:32632"), "x")
+    assert read.geoid_undulation_m == 41.5
+    lift_m = 0.0 if read.height_datum == "ellipsoidal" else 41.5
+    for lidar in site.lidars:
+        assert read.lidar(lidar.name).position[2] + lift_m == pytest.approx(lidar.position[2], abs=0.001)
 
 
 def test_shapefile_with_its_short_column_names(site, tmp_path):

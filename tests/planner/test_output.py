@@ -1,5 +1,6 @@
 """Whole files or none."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,19 @@ def test_a_link_to_nowhere_counts_as_existing(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="exists already"):
         new_text(path, "text")
     assert not (tmp_path / "elsewhere.yaml").exists()
+
+
+def test_an_interruption_while_files_are_put_in_place_waits_until_all_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = Path.replace
+
+    def interrupted(self: Path, target: Path) -> Path:
+        signal.raise_signal(signal.SIGINT)
+        return original(self, target)
+
+    with pytest.raises(KeyboardInterrupt), output_folder(tmp_path / "out") as folder:
+        for name in ("a.txt", "b.txt", "c.txt"):
+            (folder / name).write_text(name, encoding="utf-8")
+        monkeypatch.setattr(Path, "replace", interrupted)
+    assert sorted(item.name for item in (tmp_path / "out").iterdir()) == ["a.txt", "b.txt", "c.txt"]

@@ -17,6 +17,10 @@ from planner.placement.maps import Grid, look, standing_m, table_of
 from planner.placement.ranking import place
 from planner.placement.task import task_of
 
+GUSTS = (
+    "wind: {speeds_mps: [10], directions_deg: [[200, 260]], turbulence: {intensity: 0.1, length_m: 170}}\n"
+)
+
 SITE = """
 name: two points
 crs: EPSG:32632
@@ -118,7 +122,7 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
 def test_a_cluster_whose_worker_is_killed_gives_the_same_ranking():
     """A worker dies while batches are worked on; the other takes them over."""
     distributed = pytest.importorskip("distributed")
-    task = task_of(parse_site(SITE), count=2)
+    task = task_of(parse_site(SITE), count=3)  # pairs, and sets grown from them
     grid = Grid(np.linspace(446500, 449500, 17), np.linspace(6257500, 6254500, 17))
     here = place(task, grid, how=How(processes=1), most=2)
     with distributed.LocalCluster(
@@ -144,3 +148,44 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_ranking():
         item.positions_m.tolist() for item in here.ranked
     ]
     assert [item.text for item in ranked.ranked] == [item.text for item in here.ranked]
+
+
+def set_tables(count=20):
+    """Sets of three, from every tenth place."""
+    task = task_of(parse_site(SITE), count=3)
+    grid = Grid(np.linspace(446500, 449500, count), np.linspace(6257500, 6254500, count))
+    table = table_of(task, look(task, standing_m(task, grid.places_m)))
+    starts = np.arange(0, table.candidates, 40)[:, None]
+    return search.SetTables(table, (), starts, 3, np.zeros(table.candidates), 30.0, "worst")
+
+
+def test_sets_are_the_same_from_processes_and_go_on_after_a_break(tmp_path, monkeypatch):
+    tables = set_tables()
+    batches = [(number,) for number in range(len(tables.starts))]
+    here = run(search.set_batch, tables, batches)
+    assert run(search.set_batch, tables, batches, how=How(processes=2), expected_s=100.0) == here
+    monkeypatch.setattr(search, "LEAST_BATCH_S", 1e-6)
+    how, shares = How(checkpoint=tmp_path / "done", processes=1), []
+    whole = search.best_sets(tables, how=how)
+    again = search.best_sets(tables, how=how._replace(progress=shares.append))
+    assert not shares  # nothing was left to do
+    assert np.array_equal(whole.members, again.members) and np.array_equal(whole.value, again.value)
+
+
+def test_the_steps_of_a_search_share_one_progress_file(tmp_path):
+    """Pairs first, then sets: the second does not drive out what the first has done."""
+    how, shares = How(checkpoint=tmp_path / "done", processes=1), []
+    for work in (1, 2):
+        run(fails_after_two, work, [(0,), (1,)], how=how)
+    run(fails_after_two, 1, [(0,), (1,)], how=how._replace(progress=shares.append))
+    assert not shares
+
+
+def test_a_search_that_is_resumed_gives_the_same_ranking(tmp_path):
+    task = replace(task_of(parse_site(SITE + GUSTS), fixed=("one",)))
+    grid = Grid(np.linspace(446500, 449500, 9), np.linspace(6257500, 6254500, 9))
+    how = How(checkpoint=tmp_path / "done", processes=1)
+    first, second = (place(task, grid, how=how, most=2, tier="turbulent") for _ in range(2))
+    other = place(task, grid, how=How(processes=2), most=2, tier="turbulent")
+    assert [item.text for item in first.ranked] == [item.text for item in second.ranked]
+    assert [item.text for item in first.ranked] == [item.text for item in other.ranked]

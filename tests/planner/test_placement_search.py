@@ -11,7 +11,7 @@ from planner.files.yaml_site import load_site, parse_site
 from planner.placement import search
 from planner.placement.areas import area_slack_m
 from planner.placement.maps import Grid, default_grid, look, of_lidar, standing_m, table_of
-from planner.placement.numbers import numbers_of
+from planner.placement.numbers import numbers_of, turbulent_numbers
 from planner.placement.ranking import place
 from planner.placement.task import task_of
 from reconstruct.beam_table import beam_table, pair_variance, set_variance
@@ -237,3 +237,36 @@ def test_a_soft_cost_moves_the_lidar_towards_what_is_wanted_near():
         .positions_m[0, :2]
     )
     assert np.hypot(*(near - corner)) <= np.hypot(*(free - corner))
+
+
+GUSTY = SITE.replace("directions_deg", "turbulence: {intensity: 0.1, length_m: 170}, directions_deg").replace(
+    "  - {name: c, position: [447700, 6255700, 130]}\n", ""
+)
+
+
+def test_with_turbulence_the_search_ranks_and_moves_by_it():
+    """No place around the best one, judged by the turbulent tier in the core, is better by more than a per mille."""
+    task = task_of(parse_site(GUSTY), fixed=("one",))
+    grid = small_grid(task, 13)
+    linear, gusty = (place(task, grid, most=3, tier=tier) for tier in ("linear", "turbulent"))
+    values = [item.value for item in gusty.ranked]
+    assert values == sorted(values)
+    best = gusty.ranked[0]
+    assert best.turbulent is not None and "with turbulence" in best.text
+
+    def with_turbulence(east_north):
+        looks = [of_lidar(task, task.fixed[0]), look(task, standing_m(task, east_north))]
+        allowed = looks[1].allowed.all()
+        return turbulent_numbers(task, looks).value("vector", "worst") if allowed else np.inf
+
+    here = best.positions_m[0, :2]
+    assert best.value == pytest.approx(with_turbulence(here), rel=1e-9)
+    assert best.value <= with_turbulence(linear.ranked[0].positions_m[0, :2]) * (1 + 1e-9)
+    around = [with_turbulence(here + step) for step in 60.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])]
+    assert best.value <= min(around) * 1.001
+
+
+def test_turbulence_that_is_not_given_is_asked_for():
+    task = task_of(parse_site(SITE), fixed=("one",))
+    with pytest.raises(InputError, match=r"wind\.turbulence"):
+        place(task, small_grid(task), tier="turbulent")

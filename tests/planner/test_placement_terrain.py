@@ -136,8 +136,10 @@ class TestFiles:
 
 
 def test_the_command_places_on_a_terrain_and_writes_everything(tmp_path, capsys):
-    """CSV, GeoPackage, GeoTIFF and two figures; the JSON says what the files are."""
+    """CSV, GeoPackage, GeoTIFF and figures; the JSON says what the files are, and an export takes the places with it."""
     import json
+
+    import pyogrio
 
     rasterio = pytest.importorskip("rasterio")
     from planner.cli import run
@@ -159,10 +161,18 @@ def test_the_command_places_on_a_terrain_and_writes_everything(tmp_path, capsys)
         "candidates.csv",
         "places.gpkg",
         "maps.tif",
+        "sight.tif",
         "place.png",
         "place-criteria.png",
+        "place-sight.png",
     }
     assert {path.name for path in out.iterdir()} == names
     with rasterio.open(out / "maps.tif") as maps:
         assert maps.crs.to_epsg() == 32632
         assert "error_vector" in maps.descriptions
+    with rasterio.open(out / "sight.tif") as sight:
+        assert sight.descriptions == ("a_m",)
+        above = sight.read(1)
+    assert (above[:4] >= 0).all() and (above[-2:] < 0).all()  # north of the ridge the target is seen
+    assert run(["export", str(tmp_path / "site.yaml"), "--as", "gpkg", "--out", str(out), "--quiet"]) == 0
+    assert "places" in pyogrio.list_layers(out / "plan.gpkg")[:, 0]

@@ -32,17 +32,21 @@ def has_keys_of_its_own(field: FieldInfo) -> bool:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_page_is_what_the_nouns_say_now(name: str) -> None:
-    """`python -m planner.files.reference docs` writes the pages anew."""
-    assert (DOCS / name).read_text(encoding="utf-8") == PAGES[name]()
+    """Types, limits, defaults and words."""
+    same = (DOCS / name).read_text(encoding="utf-8") == PAGES[name]()
+    assert same, "a noun has changed: write the pages anew by `python -m planner.files.reference docs`"
 
 
 @pytest.mark.parametrize(("noun", "key", "field"), KEYS)
 def test_key_is_described(noun: type[Noun], key: str, field: FieldInfo) -> None:
     """One sentence or more; a key that may be missing says what is then taken; a value has an example."""
     does, example = told(noun, key)
-    assert does.endswith("."), "no description"
-    assert ("Without it: " in does) == (not field.is_required() and field.get_default() is None)
-    assert example or has_keys_of_its_own(field) or len(get_args(field.annotation)) == 1
+    without = not field.is_required() and field.get_default() is None
+    assert does.endswith("."), "a string under the field has to say what it does"
+    assert "Without it: " in does or not without, "a key without a default says what is taken without it"
+    assert example or has_keys_of_its_own(field) or len(get_args(field.annotation)) == 1, (
+        "an example is missing"
+    )
 
 
 @pytest.mark.parametrize(("noun", "key", "field"), KEYS)

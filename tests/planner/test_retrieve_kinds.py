@@ -228,18 +228,82 @@ def test_scans_without_a_wind_stay_in_the_table_with_their_reason(tmp_path: Path
     line = written(tmp_path, plan, "sector")
     path = tmp_path / "sector.csv"
     frame = pd.read_csv(path)
-    middle = plan.layout["sector"].scan.azimuth_deg[4:12]
-    inside = frame["azimuth_deg"].sub(middle[0] - 1).mod(360) < middle[-1] - middle[0] + 2
+    middle = plan.layout["sector"].scan.azimuth_deg[4:13]
+    inside = frame["azimuth_deg"].sub(middle[0] - 1).mod(360) < np.mod(middle[-1] - middle[0], 360) + 2
     frame.loc[inside, "radial_speed_mps"] = np.nan
     frame.to_csv(path, index=False)
     more = "sizes_deg: [60, 36, 28]\n"
     found = run(tmp_path, plan, f"{line}, filters: {{automatic: 'off', ray_share: 0.4}}", more=more)
     fast = table(tmp_path, "fast_sector")
     assert found.lost["sector"] == {"fewer rays than unknowns, 36°": PASSES}
-    assert fast.groupby("sector_deg")["reason"].first().to_dict() == {
-        60: None,
-        36: "fewer rays than unknowns",
-    }
+    assert fast.query("sector_deg == 60")["reason"].isna().all()
+    assert (fast.query("sector_deg == 36")["reason"] == "fewer rays than unknowns").all()
+    assert sorted(fast["sector_deg"].unique()) == [36, 60]  # of 28 degrees no ray is left: counted before
     assert fast.query("sector_deg == 60")["u_mps"].notna().all()
     counts = json.loads((tmp_path / "results" / "filters.json").read_text(encoding="utf-8"))
     assert {"no wind": "fewer rays than unknowns, 36°", "scans": PASSES} in counts["sector"]
+
+
+def test_a_nacelle_file_gives_means_along_and_across_by_the_rules(tmp_path: Path, plan: Plan) -> None:
+    """Beams at 350 and 50 degrees, 2 Hz in turn: five whole periods, of which one lost a fifth of its right beam."""
+    seconds = np.arange(1200) / 2
+    line = np.arange(1200) % 2
+    toward = -radial(np.where(line == 0, -10.0, 50.0), np.zeros(1200))
+    toward[(seconds >= 240) & (seconds < 264.5) & (line == 1)] = 9998.0  # the file's way to say nothing
+    frame = pd.DataFrame(
+        {
+            "Timestamp": START + (seconds * 1e9).astype("timedelta64[ns]"),
+            "LOSindex": line,
+            "Distance": 200.0,
+            "RWS": toward,
+            "CNR": -10.0,
+            "RWSStatus": 1,
+        }
+    )
+    frame.to_csv(tmp_path / "nacelle.csv", index=False)
+    beams = "beam_azimuth_deg: {0: 350, 1: 50}, gate_m: 200, two_beam: {largest_angle_deg: 85}"
+    found = run(tmp_path, plan, f"{{scan: beams, kind: nacelle, path: nacelle.csv, {beams}")
+    means = table(tmp_path, "two_beam_beams_120s")
+    axis = np.radians(20.0)
+    along, across = -(U * np.sin(axis) + V * np.cos(axis)), U * np.cos(axis) - V * np.sin(axis)
+    assert len(means) == 4
+    assert means["along_mps"].to_numpy() == pytest.approx(along, abs=1e-4)
+    assert means["across_mps"].to_numpy() == pytest.approx(across, abs=1e-4)
+    assert means["angle_deg"].to_numpy() == pytest.approx(np.degrees(np.arctan2(across, along)), abs=1e-3)
+    assert means["samples_left"].tolist() == [120] * 4
+    rules = {step.name: (step.before, step.after) for step in found.steps["beams"]}
+    assert rules["samples on both beams"] == (5, 4)
+    fast = table(tmp_path, "fast_beams").dropna(subset="u_mps")
+    assert len(fast) == 600 - 24
+    assert fast["u_mps"].to_numpy() == pytest.approx(U, abs=1e-4)
+
+
+def test_rules_for_two_beams_belong_to_a_scan_of_two(tmp_path: Path, plan: Plan) -> None:
+    line = f"{written(tmp_path, plan, 'sector')}, two_beam: {{}}"
+    with pytest.raises(InputError, match="sector of 15 rays"):
+        run(tmp_path, plan, line)
+
+
+def test_the_means_of_a_run_are_those_of_pandas_from_its_single_scans(tmp_path: Path, plan: Plan) -> None:
+    """A second computation of period ends, counts, scalar and vector means and w, with the times shifted by 37 s."""
+    lines = [written(tmp_path, plan, f"stare {name}", missing=3) for name in "ABC"]
+    averaging = "averaging: {periods_s: [7, 60], time_shift_s: 37}\n"
+    run(tmp_path, plan, *lines, more=f"pairs: [triple]\n{averaging}")
+    fast = table(tmp_path, "fast_triple")
+    shifted = pd.to_datetime(fast["time_utc"]) + pd.Timedelta(seconds=37)
+    for period_s in (7, 60, 600):
+        ends = shifted.dt.floor(f"{period_s}s") + pd.Timedelta(seconds=period_s)
+        grouped = fast.groupby(ends.to_numpy())
+        means = table(tmp_path, f"means_{period_s}s")
+        assert means["time_utc"].tolist() == list(grouped.groups)
+        assert means["count"].tolist() == grouped.size().tolist()
+        assert means["speed_mps"].to_numpy() == pytest.approx(
+            grouped["speed_mps"].mean().to_numpy(), abs=1e-4
+        )
+        vector = np.hypot(grouped["u_mps"].mean(), grouped["v_mps"].mean())
+        assert means["vector_speed_mps"].to_numpy() == pytest.approx(vector.to_numpy(), abs=1e-4)
+        assert means["w_mps"].to_numpy() == pytest.approx(grouped["w_mps"].mean().to_numpy(), abs=1e-4)
+        turn = np.degrees(np.arctan2(-grouped["u_mps"].mean(), -grouped["v_mps"].mean())) % 360
+        assert means["from_deg"].to_numpy() == pytest.approx(turn.to_numpy(), abs=1e-3)
+        whole = period_s // plan.layout["stare A"].scan.period_s
+        assert means["availability"].to_numpy() == pytest.approx(np.minimum(means["count"] / whole, 1), abs=1e-5)

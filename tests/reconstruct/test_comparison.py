@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.errors import InputError
+from reconstruct.agreement import set_beside
 from reconstruct.comparison import (
     fit_direction,
     fit_direction_plainly,
@@ -60,6 +61,32 @@ def test_the_standard_error_covers_the_truth_as_often_as_it_should() -> None:
         )  # scatter that grows with the wind
         off.append((fit.slope - 1.0) / fit.slope_standard_error)
     assert np.std(off) == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_scatters_standard_error_is_that_of_a_gaussians() -> None:
+    """A standard deviation of n Gaussian values is known to 1/sqrt(2(n - 1)) of itself; of directions alike."""
+    rng = np.random.default_rng(8)
+    lidar = rng.uniform(4.0, 16.0, 4000)
+    noise = rng.normal(0.0, 0.5, 4000)
+    fit = fit_speed(lidar + noise, lidar, blocks=200)
+    share = 1 / np.sqrt(2 * 3999)
+    assert fit.residual_std_standard_error_mps == pytest.approx(0.5 * share, rel=0.25)
+    angle = rng.uniform(130.0, 250.0, 4000)
+    turned = fit_direction(angle + 4 * noise, angle)
+    assert turned.residual_std_standard_error_deg == pytest.approx(2.0 * share, rel=0.5)
+
+
+def test_two_numbers_agree_within_two_of_their_common_standard_errors() -> None:
+    """3 and 4 thousandths make 5; what is not known agrees with nothing and disagrees with nothing."""
+    near, far = (set_beside(0.99, 0.99 - off, errors=(0.003, 0.004)) for off in (0.0099, 0.0101))
+    assert near is not None
+    assert far is not None
+    assert (near.agrees, far.agrees) == (True, False)
+    assert set_beside(None, 1.0) is None
+    assert set_beside(float("nan"), 1.0) is None
+    unsure = set_beside(1.0, 1.0)
+    assert unsure is not None
+    assert unsure.agrees is None
 
 
 @given(st.floats(0.1, 10.0))

@@ -14,7 +14,7 @@ SPEEDS = np.array([8.6603, 8.1915, 7.6604, 7.0711, 6.4279, 5.7358, 5.0])
 
 
 def ivap(azimuth_deg: np.ndarray, speed: np.ndarray) -> tuple[float, float]:
-    """Liang (2007), as physics.md writes it."""
+    """Liang (2007): u and v from sums over sines, cosines and radial speeds."""
     s, c = np.sin(np.radians(azimuth_deg)), np.cos(np.radians(azimuth_deg))
     a, b, cc, e, f = s @ s, c @ c, s @ c, speed @ c, speed @ s
     d = a * b - cc**2

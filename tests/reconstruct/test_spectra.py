@@ -83,7 +83,7 @@ def test_mann_without_shear_is_the_isotropic_tensor():
 
 
 def test_mann_ratios_are_those_that_iec_derives_its_parameters_from():
-    """IEC 61400-1 Annex C: sigma_iso = 0.55 sigma_1 at gamma 3.9, sigma_2 0.7, sigma_3 0.5 of it."""
+    """IEC 61400-1 ed. 4, eq. C.12: sigma_iso = 0.55 sigma_1 at gamma 3.9, sigma_2 0.7, sigma_3 0.5 of it."""
     u, v, w = spectra.mann_std_ratio(3.9)
     assert 1 / u == pytest.approx(0.55, abs=0.01)
     assert v / u == pytest.approx(0.7, abs=0.03)
@@ -91,7 +91,7 @@ def test_mann_ratios_are_those_that_iec_derives_its_parameters_from():
 
 
 def test_mann_length_of_iec_air_is_0_8_of_the_scale_parameter():
-    """IEC 61400-1 Annex C: l = 0.8 x 42 m = 33.6 m; ours comes from the equal inertial subrange."""
+    """IEC 61400-1 ed. 4, eq. C.12: l = 0.8 x 42 m = 33.6 m; ours comes from the equal inertial subrange."""
     air = Turbulence(0.1, from_kaimal_length_m(8.1 * 42), model="mann")
     assert air.mann_length_m == pytest.approx(33.6, rel=0.02)
 

@@ -11,10 +11,10 @@ from geometry.beams import unit_vector
 from geometry.errors import InputError
 from geometry.gates import Probe
 from reconstruct.error_draws import Draws
-from reconstruct.flight import WaveSight, carried_mps, met_waves, to_wind_frame
+from reconstruct.flight import WaveSight, carried_mps, met_waves, passing, to_wind_frame
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence, spectral_tensor, sphere
-from reconstruct.waves import LONG_COUNT, Waves, draw_waves, long_share
+from reconstruct.waves import LONG_COUNT, SHORT_COUNT, Waves, draw_waves, long_share
 from reconstruct.wind import WindState
 
 LENGTH_M = 60.0
@@ -46,7 +46,7 @@ def covariance(waves, separation_m):
     return (waves.first * turned) @ waves.first.T + (waves.second * turned) @ waves.second.T
 
 
-@pytest.mark.parametrize("cut", [0.13, np.pi / 12, 5.0])
+@pytest.mark.parametrize("cut", [0.26, np.pi / 12, 5.0])
 def test_short_waves_have_the_tail_of_the_energy(cut):
     """With s = 1/(1 + k²l²) the tail of E is a regularised incomplete beta function."""
     short = part_of(drawn(short_count=MANY, cut=cut), slice(1, None))
@@ -57,13 +57,13 @@ def test_short_waves_have_the_tail_of_the_energy(cut):
 @pytest.mark.parametrize("lengths", [0.0, 0.5, 2.0, 20.0])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_long_waves_have_the_correlation_of_the_bell_of_the_spectrum_at_any_distance(lengths, axis):
-    """Isotropic turbulence (Batchelor 1953) of E(k) times exp(-(k L / 3)²); a box of 10 lengths would repeat itself."""
+    """Isotropic turbulence (Batchelor 1953) of E(k) times exp(-(k L / 6)²); a box of 10 lengths would repeat itself."""
     long = part_of(drawn(long_count=MANY), slice(0, MANY))
     distance = max(lengths * LENGTH_M, 1.0)
 
     def band(kernel):
-        bell = lambda k: np.exp(-((k * LENGTH_M / 3) ** 2))  # noqa: E731
-        return quad(lambda k: energy(k) * bell(k) * kernel(k * distance), 1e-9, 7.5 / LENGTH_M, limit=400)[0]
+        bell = lambda k: np.exp(-((k * LENGTH_M / 6) ** 2))  # noqa: E731
+        return quad(lambda k: energy(k) * bell(k) * kernel(k * distance), 1e-9, 15.0 / LENGTH_M, limit=400)[0]
 
     along = band(lambda x: 2 * (np.sin(x) - x * np.cos(x)) / x**3)
     aside = band(lambda x: np.sin(x) / x - (np.sin(x) - x * np.cos(x)) / x**3)
@@ -78,7 +78,7 @@ def test_long_waves_of_a_sheared_tensor_have_its_variance_down_to_wavenumber_0()
     air = Turbulence(0.1, LENGTH_M, "mann")
     long = part_of(drawn(air, long_count=MANY), slice(0, MANY))
     direction, weight = sphere(64, 128)
-    k = np.geomspace(1e-6, 7.5 / LENGTH_M, 400)
+    k = np.geomspace(1e-6, 15.0 / LENGTH_M, 400)
     each = [
         [np.sum(weight * part) for part in spectral_tensor(air, direction * wavenumber)] for wavenumber in k
     ]
@@ -96,16 +96,13 @@ def test_waves_are_free_of_divergence():
         assert np.all(along <= 1e-9 * np.linalg.norm(waves.vector, axis=0) * np.linalg.norm(root, axis=0))
 
 
-def test_a_single_draw_is_near_the_right_variance():
-    """Strata keep one draw of the usual size within some per cent; its kind of waves is many."""
-    usual = [drawn(long_count=LONG_COUNT, short_count=512, seed=seed) for seed in range(20)]
+def test_a_single_draw_of_the_usual_size_is_near_the_right_variance():
+    """Within 2 %, and more than 200 waves share it: their sum is nearly Gaussian."""
+    usual = [drawn(long_count=LONG_COUNT, short_count=SHORT_COUNT, seed=seed) for seed in range(20)]
     variance = np.array([np.diag(covariance(waves, np.zeros(3))) for waves in usual])
-    assert np.std(variance, axis=0).max() < 0.02
-    size = np.sum(np.square(usual[0].first[0, :LONG_COUNT]) + np.square(usual[0].second[0, :LONG_COUNT]))
-    squares = np.sum(
-        np.square(np.square(usual[0].first[0, :LONG_COUNT]) + np.square(usual[0].second[0, :LONG_COUNT]))
-    )
-    assert size**2 / squares > 100
+    assert np.max(np.std(variance, axis=0) / np.mean(variance, axis=0)) < 0.02
+    each = np.square(usual[0].first) + np.square(usual[0].second)
+    assert np.all(np.sum(each, axis=1) ** 2 / np.sum(each**2, axis=1) > 200)
 
 
 def test_kaimal_is_refused():
@@ -133,7 +130,7 @@ def scan():
 
 def sums_by_hand(rays, wind, waves, amplitudes, scans):
     """Each ray of each scan averaged over 200 moments and 64 places of its probe, wave by wave."""
-    a, b = amplitudes[0, 0] + 1j * amplitudes[0, 1], amplitudes[1, 0] + 1j * amplitudes[1, 1]
+    a, b = amplitudes
     strength = waves.first * a + waves.second * b
     share = (np.arange(200) + 0.5) / 200 - 0.5
     out = np.empty((scans, rays.count))
@@ -153,13 +150,16 @@ def sums_by_hand(rays, wind, waves, amplitudes, scans):
 
 
 def test_a_scan_makes_of_waves_what_averages_by_hand_make():
-    """To the square of the 2° by which a beam turns in its ray, and of the bend of its arc."""
+    """But for the 2° by which a beam turns in its ray while the wave does; waves that 64 places in 170 m resolve."""
     rays, wind = scan(), WindState(speed_mps=8.0, from_deg=250.0)
-    waves = drawn(long_count=30, short_count=10)
+    waves = drawn(long_count=30, short_count=30, cut=0.3)
+    waves = part_of(waves, np.linalg.norm(waves.vector, axis=0) < 0.5)
+    assert waves.vector.shape[1] > 30
     amplitudes = waves.amplitudes(np.random.default_rng(2))
-    found = WaveSight.of(rays, wind, waves, Draws.none(rays)).radial_speed(amplitudes, 5)
+    found = WaveSight.of(rays, wind, waves, Draws.none(rays), scans=5).radial_speed(amplitudes)
     wanted = sums_by_hand(rays, wind, waves, amplitudes, 5)
-    assert np.max(np.abs(found - wanted)) < 0.005 * np.std(wanted)
+    assert np.max(np.abs(found - wanted)) < 0.02 * np.std(wanted)
+    assert np.std(found - wanted) < 0.008 * np.std(wanted)
 
 
 def test_lasting_errors_and_the_place_of_the_target_move_the_waves_as_they_move_the_scan():
@@ -178,16 +178,19 @@ def test_lasting_errors_and_the_place_of_the_target_move_the_waves_as_they_move_
         azimuth_deg=none.azimuth_deg + 1.5, delay_s=none.delay_s + 2.0, head_m=none.head_m + [10.0, 0.0, 0.0]
     )
     offset = to_wind_frame(np.array([20.0, 0.0, 0.0]), wind.from_deg)
-    found = WaveSight.of(rays, wind, waves, errors, offset_m=offset).radial_speed(amplitudes, 4)
-    wanted = WaveSight.of(moved, wind, waves, none).radial_speed(amplitudes, 4)
+    found = WaveSight.of(rays, wind, waves, errors, scans=4, offset_m=offset).radial_speed(amplitudes)
+    wanted = WaveSight.of(moved, wind, waves, none, scans=4).radial_speed(amplitudes)
     assert np.allclose(found, wanted, atol=1e-4)
 
 
 def test_the_target_meets_the_waves_as_time_passes():
-    wind, waves = WindState(speed_mps=7.0, from_deg=10.0, vertical_mps=0.5), drawn(long_count=20, short_count=5)
+    wind, waves = (
+        WindState(speed_mps=7.0, from_deg=10.0, vertical_mps=0.5),
+        drawn(long_count=20, short_count=5),
+    )
     amplitudes = waves.amplitudes(np.random.default_rng(2))
-    found = met_waves(wind, waves, amplitudes, first_s=0.5, step_s=1.0, count=150)
+    found = met_waves(waves, amplitudes, passing(wind, waves, 0.5, 1.0, 150))
     place = -(np.arange(150) + 0.5)[:, None] * carried_mps(wind)
-    a, b = amplitudes[0, 0] + 1j * amplitudes[0, 1], amplitudes[1, 0] + 1j * amplitudes[1, 1]
+    a, b = amplitudes
     wanted = (np.exp(1j * place @ waves.vector) @ (waves.first * a + waves.second * b).T).real
     assert np.allclose(found, wanted, atol=1e-4)
