@@ -8,7 +8,7 @@ is held in memory.
 import hashlib
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -78,33 +78,16 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
         shutil.rmtree(loaded.campaign.output / WORK, ignore_errors=True)
     loaded, clocks = _clocks_set(loaded, plan)
     campaign, work = loaded.campaign, loaded.campaign.output / WORK / key_of(loaded)
-    todo = _jobs(campaign, plan)
-    jobs = {job.name: job for _, job in todo}
-    partners = {name for pair in campaign.pairs for name in partners_of(pair, plan, jobs)}
-    merged = {name: _Merged() for name in jobs}
+    run = _Run.of(campaign, plan, work)
     sums = SumFiles(work / "sums")
-    beams: BeamParts = {}
     for item in campaign.inputs:
         require_log(item.attitude)
     shutil.rmtree(work / STAGING, ignore_errors=True)  # of a run that was killed
     with output_folder(campaign.output, within=work / STAGING) as folder:
-        for number, (item, job) in enumerate(todo):
-            own = campaign if item.filters is None else campaign.model_copy(update={"filters": item.filters})
-            for kept, was_there, share in _worked(item, job, own, plan, work):
-                part = kept.part
-                merged[job.name].add(kept, was_there=was_there)
-                if (
-                    job.kind == "fan" or job.name not in partners
-                ):  # a partner's rays are in the winds of its pair
-                    append_fast(folder, job.name, part.fast)
-                for (sector_deg, period_s), each in part.sums.items():
-                    sums.add(Key(job.name, sector_deg, period_s), each)
-                for period_s, radial in part.beams.items():
-                    beams.setdefault((job.name, period_s), []).append((radial, part.gates_m))
-                _tell(progress, (number + share) / (len(todo) + bool(campaign.pairs)))
+        merged, beams = _work_through(run, folder, sums, progress)
         gaps = {pair.pair: retrieve_pair(pair, campaign, plan, work, folder, sums) for pair in campaign.pairs}
-        two_beam = write_beams(folder, plan.places, jobs, beams)
-        means = write_means(folder, campaign, _results(todo, campaign, plan), sums)
+        two_beam = write_beams(folder, plan.places, run.jobs, beams)
+        means = write_means(folder, campaign, _results(run.todo, campaign, plan), sums)
         logs = {name: log for name, each in merged.items() if (log := each.logged) is not None}
         write_drifts(folder, logs)
         trimmed = {
@@ -114,11 +97,11 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
         found = Retrieved(
             folder=campaign.output,
             steps={name: (*each.steps, *two_beam.get(name, ())) for name, each in merged.items()},
-            lost={name: each.lost for name, each in merged.items()},
+            lost={name: {} if name in run.partners else each.lost for name, each in merged.items()},
             agreements={name: each.agreement for name, each in merged.items()},
             notes={name: each.notes for name, each in merged.items()},
             offsets_deg={name: each.offset_deg for name, each in merged.items()},
-            alone=tuple(name for name, job in jobs.items() if job.kind != "fan" and name not in partners),
+            alone=run.alone,
             means=means,
             gaps=gaps,
             drifts=logs,
@@ -131,6 +114,56 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
     shutil.rmtree(campaign.output / WORK, ignore_errors=True)
     _tell(progress, 1.0)
     return found
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What is to be done, and where it is kept until all is done."""
+
+    campaign: Campaign
+    plan: Plan
+    work: Path
+    todo: list[tuple[RayInput, ScanJob]]
+    partners: frozenset[str]  # single beams whose rays are in the winds of a pair
+
+    @classmethod
+    def of(cls, campaign: Campaign, plan: Plan, work: Path) -> "_Run":
+        todo = _jobs(campaign, plan)
+        jobs = {job.name: job for _, job in todo}
+        names = {name for pair in campaign.pairs for name in partners_of(pair, plan, jobs)}
+        return cls(campaign, plan, work, todo, frozenset(name for name in names if jobs[name].kind != "fan"))
+
+    @property
+    def jobs(self) -> dict[str, ScanJob]:
+        """The jobs by the names of their results."""
+        return {job.name: job for _, job in self.todo}
+
+    @property
+    def alone(self) -> tuple[str, ...]:
+        """Beams that meet no other lidar's."""
+        return tuple(job.name for _, job in self.todo if job.kind != "fan" and job.name not in self.partners)
+
+
+def _work_through(
+    run: _Run, folder: Path, sums: SumFiles, progress: Progress | None
+) -> tuple[dict[str, "_Merged"], BeamParts]:
+    """Every part of every job: its single scans written, its sums kept, its counts added up."""
+    merged: dict[str, _Merged] = {name: _Merged() for name in run.jobs}
+    beams: BeamParts = {}
+    for number, (item, job) in enumerate(run.todo):
+        filters = item.filters or run.campaign.filters
+        own = run.campaign.model_copy(update={"filters": filters})
+        for kept, was_there, share in _worked(item, job, own, run.plan, run.work):
+            part = kept.part
+            merged[job.name].add(kept, was_there=was_there)
+            if job.name not in run.partners:
+                append_fast(folder, job.name, part.fast)
+            for (sector_deg, period_s), each in part.sums.items():
+                sums.add(Key(job.name, sector_deg, period_s), each)
+            for period_s, radial in part.beams.items():
+                beams.setdefault((job.name, period_s), []).append((radial, part.gates_m))
+            _tell(progress, (number + share) / (len(run.todo) + bool(run.campaign.pairs)))
+    return merged, beams
 
 
 def key_of(loaded: Loaded) -> str:

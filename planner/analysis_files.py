@@ -190,9 +190,8 @@ def scan_lines(found: Retrieved, scan: str) -> list[str]:
             f"automatic filter beside the usual CNR limits of {CNR_DB[0]:g} to {CNR_DB[1]:g} dB: both keep {both} rays, "
             f"the limits alone {limits}, the filter alone {automatic}, neither {neither}"
         )
-    if scan in found.alone:
-        return [*lines, ALONE]
-    return lines + [f"no wind: {line}" for line in told_losses(found.lost[scan])]
+    lines += [f"no wind: {line}" for line in told_losses(found.lost[scan])]
+    return [*lines, ALONE] if scan in found.alone else lines
 
 
 def told_losses(lost: Mapping[str, int]) -> list[str]:

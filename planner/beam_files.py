@@ -115,7 +115,7 @@ def beam_table(places: Places, job: ScanJob, parts: list[tuple[BeamSums, FloatAr
     return pd.DataFrame(
         {
             "time_utc": means.time_utc,
-            "azimuth_deg": np.mod(azimuth, 360.0),
+            "azimuth_deg": np.mod(np.round(azimuth, 5), 360.0),  # as it is written: 0 and not 360.00000
             "elevation_deg": elevation,
             "range_m": range_m,
             "distance_m": np.hypot(*(end - head)[:, :2].T),

@@ -9,6 +9,7 @@ from geometry.arrays import FloatArray
 from planner.fidelity_wind import Air
 from planner.places import Places
 from planner.site import Mast
+from reconstruct.clocks import clock_std_s
 from reconstruct.periods import scans_in
 from reconstruct.persistence import split_covariance
 from reconstruct.ray_fit import ray_fit
@@ -29,6 +30,7 @@ SOURCES = {
     "position_m": "position",
 }
 TURBULENCE = "turbulence between scan and target"
+CLOCK = "clock of the lidar"  # what it adds to that
 NOT_DECLARED = "the site declares no turbulence"
 REFERENCE = "reference instrument"
 NO_REFERENCE = "the mast's speed_uncertainty_mps and direction_uncertainty_deg are not declared"
@@ -62,6 +64,10 @@ def ten_minute_budget(scan: str, target: str, air: Air, mast: Mast | None) -> Bu
         unknown[TURBULENCE] = NOT_DECLARED
     else:
         parts[TURBULENCE] = predict_ten_minute(rays, state, air.turbulence).vector_covariance_m2s2
+        if unknown.pop("clock", None):
+            clock_s = clock_std_s(rays, air.sources)
+            late = predict_ten_minute(rays, state, air.turbulence, clock_s=clock_s)
+            parts[CLOCK] = late.vector_covariance_m2s2 - parts[TURBULENCE]
     speed, direction = (mast.speed_uncertainty_mps, mast.direction_uncertainty_deg) if mast else (None, None)
     if speed is None or direction is None:
         unknown[REFERENCE] = NO_REFERENCE

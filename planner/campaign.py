@@ -275,6 +275,9 @@ class Campaign(Noun):
     E.g. [60, 30, 8]"""
     columns: Literal[2, 3] = 2
     """Components of the fit: 2, u and v; 3, u, v and w. E.g. 3"""
+    weights: Literal["equal", "cnr"] = "equal"
+    """Weights of the rays in a fit: all alike, or by the noise that the CNR of each lets expect (cnr), which pays where
+    noise is larger than turbulence. E.g. cnr"""
     filters: Filters = Filters()
     """What is taken away from rays and scans."""
     selection: Selection = Selection()
@@ -289,5 +292,5 @@ class Campaign(Noun):
     """The mast's data. Without it: nothing is compared."""
     output: Path = Path("results")
     """Folder of the results, beside the campaign file. E.g. results"""
-    chunk_rays: Count = 500_000
+    chunk_rays: Count = 200_000
     """Rays of a store or database that are worked on at once. E.g. 100000"""

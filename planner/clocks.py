@@ -85,10 +85,11 @@ def told_clock(lag: ClockLag) -> str:
             f"clock left as it is: no lag correlates with the mast (best correlation {lag.correlation:.2f})"
         )
     error = "" if np.isnan(lag.standard_error_s) else f" ± {lag.standard_error_s:.2f}"
+    late = f"{abs(lag.lag_s):.2f}{error} s {'late' if lag.lag_s >= 0 else 'early'}"
     days = f"{lag.days} day{'s' if lag.days > 1 else ''}"
     return (
-        f"clock set by the mast: rays were {lag.lag_s:.2f}{error} s late ({days}, correlation {lag.correlation:.2f}) "
-        f"and are moved by {-lag.lag_s:+.2f} s"
+        f"clock set by the mast: rays were {late} ({days}, correlation {lag.correlation:.2f}) and are moved by "
+        f"{-lag.lag_s:+.2f} s"
     )
 
 
@@ -147,7 +148,8 @@ def told_trims(trims: dict[str, SonicTrim]) -> list[str]:
     lines = []
     for name, each in trims.items():
         lag = each.lag
-        late = f"rays {lag.lag_s:+.2f} s after it (correlation {lag.correlation:.2f})"
+        side = "after" if lag.lag_s >= 0 else "before"
+        late = f"rays came {abs(lag.lag_s):.2f} s {side} it (correlation {lag.correlation:.2f})"
         if np.isnan(lag.lag_s):
             late = f"lag not found (best correlation {lag.correlation:.2f})"
         lines.append(

@@ -21,7 +21,7 @@ MAST_STD_M = 0.2
 TURBINE_STD_M = 1.0
 
 # What a map gives of a target (k = 1), for planning: that of the simulated maps in the tests.
-MAP_STD_DEG = 0.003
+MAP_STD_DEG = 0.001
 MAP_RANGE_STD_M = 0.1
 
 

@@ -71,7 +71,7 @@ def pointed(
     """
     if seconds := item.offsets.clock_s:
         moved = records.time_utc + np.timedelta64(round(seconds * 1e9), "ns")
-        records = _noted(replace(records, time_utc=moved), f"clock moved by {seconds:g} s")
+        records = _noted(replace(records, time_utc=moved), f"clock moved by {seconds:+.4g} s")
     records, known = _turned_back(records, item, known)
     return _mounted(records, item, layout, places, known)
 

@@ -166,8 +166,9 @@ def gridded(records: Records, job: ScanJob) -> Gridded:
         looks_at = nearest_direction(
             records, scan.azimuth_deg, scan.elevation_deg, within_deg=FARTHEST_POINT_DEG
         )
-        own = records.at_rays(looks_at == job.target_column)
-        found = scan_grid(_alone(own), scan.azimuth_deg[:1], step_deg=360.0)
+        column = job.target_column or 0
+        own = records.at_rays(looks_at == column)
+        found = scan_grid(_alone(own), scan.azimuth_deg[column : column + 1], step_deg=360.0)
         near = Step("near a point", records.rays, int(np.count_nonzero(looks_at >= 0)))
         return found._replace(step=near)
     if spec.type == "stare":

@@ -8,6 +8,7 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from planner.campaign import CNR_DB, Campaign, Filters
 from planner.scan_jobs import ScanJob, Size, gridded
+from planner.signal_noise import cnr_weights
 from reconstruct.automatic_filter import Agreement, Window, compare_filters, filter_outliers
 from reconstruct.averaging import PeriodSums, TimeArray, period_sums
 from reconstruct.beam_means import BeamSums, along_beam_mps, beam_sums
@@ -16,6 +17,7 @@ from reconstruct.filters import (
     Filtered,
     Step,
     goodness,
+    keep,
     limit_cnr,
     limit_goodness,
     limit_radial_speed,
@@ -77,10 +79,14 @@ def _fan_part(
     """The winds of a fan, of every size, and their sums."""
     whole = partial_scans(filtered, ray_share=campaign.filters.ray_share)
     steps, lost = [*part.steps, whole.step], dict[str, int]()
+    weights = None
+    if campaign.weights == "cnr":
+        weights = cnr_weights(grid.cnr_db, job.layout, noise_mps=campaign.filters.noise_mps)
+        steps.append(keep(whole.values, weights > 0, "CNR for its weight").step)
     fast: list[dict[str, FloatArray | TimeArray]] = []
     sums: dict[tuple[float, float], PeriodSums] = {}
     for size in job.sizes:
-        table, step, unknown = _fit(grid, whole.values, size, job, campaign)
+        table, step, unknown = _fit(grid, whole.values, weights, size, job, campaign)
         if judges_fit(campaign.filters):
             steps.append(step)
         lost |= {f"{reason}, {size.sector_deg:g}°": count for reason, count in unknown.items()}
@@ -111,7 +117,7 @@ def _beam_part(part: ScanPart, campaign: Campaign) -> ScanPart:
     fit = sector_wind(rays.azimuth_deg[:, None], rays.elevation_deg[:, None], rays.radial_speed_mps[:, None])
     table = wind_table(rays.time_utc, fit, float("nan"), np.ones(len(fit.rays), dtype=bool))
     table |= {
-        "azimuth_deg": rays.azimuth_deg,
+        "azimuth_deg": np.mod(np.round(rays.azimuth_deg, 5), 360.0),  # as it is written: 0 and not 360.00000
         "elevation_deg": rays.elevation_deg,
         "radial_speed_mps": rays.radial_speed_mps,
         "along_beam_mps": along_beam_mps(rays.radial_speed_mps, rays.elevation_deg),
@@ -260,14 +266,22 @@ def _series(grid: ScanGrid, speed: FloatArray, job: ScanJob) -> RaySeries:
 
 
 def _fit(
-    grid: ScanGrid, speed: FloatArray, size: Size, job: ScanJob, campaign: Campaign
+    grid: ScanGrid,
+    speed: FloatArray,
+    weights: FloatArray | None,
+    size: Size,
+    job: ScanJob,
+    campaign: Campaign,
 ) -> tuple[dict[str, FloatArray | TimeArray], Step, dict[str, int]]:
     """Winds of the scans of one size: one row a scan that had any ray, and how many have no wind, by reason."""
     azimuth, elevation = (part[..., size.rays] for part in grid.geometry)
     speed = speed[:, size.rays]
-    fit = sector_wind(azimuth + job.turn_deg, elevation + job.raise_deg, speed, columns=job.columns)
+    weight = None if weights is None else weights[:, size.rays]
+    fit = sector_wind(
+        azimuth + job.turn_deg, elevation + job.raise_deg, speed, columns=job.columns, weights=weight
+    )
     filters = campaign.filters
-    good = goodness(fit, speed, noise_mps=filters.noise_mps)
+    good = goodness(fit, speed, noise_mps=filters.noise_mps, weights=weight)
     kept = limit_goodness(
         fit.wind_mps[:, 0],
         good,

@@ -49,7 +49,7 @@ class Options(NamedTuple):
 
 
 class MastSamples(NamedTuple):
-    """What a cup and a vane at the reference target would have shown in one period, one sample a second."""
+    """What a cup and a vane at the reference target would have shown in one period, two samples a second."""
 
     time_utc: TimeArray  # (sample,)
     uv_mps: FloatArray  # (sample, 2)
@@ -169,10 +169,10 @@ def campaign_parts(campaign: Virtual, plan: Plan, options: Options) -> Iterator[
 
 def true_means(part: Part) -> dict[str, object]:
     """One row of the table of truths: the state that was drawn, and what the target's own air did in the period."""
-    u, v = part.mast.uv_mps.T
+    time, (u, v) = part.mast.time_utc, part.mast.uv_mps.T
     mean_u, mean_v = vector_mean(u, v)
     return {
-        "time_utc": part.mast.time_utc[0] - np.timedelta64(500, "ms") + np.timedelta64(len(u), "s"),
+        "time_utc": time[-1] + (time[1] - time[0]) / 2,
         "state_speed_mps": part.state.speed_mps,
         "state_from_deg": part.state.from_deg,
         "speed_mps": float(scalar_mean(u, v)),

@@ -13,6 +13,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from reconstruct.climate import Climate
+from reconstruct.clocks import clock_std_s
 from reconstruct.periods import TEN_MINUTES_S
 from reconstruct.persistence import random_variance
 from reconstruct.ray_fit import ray_fit
@@ -99,6 +100,7 @@ def predict_campaign(
         averaging_s=averaging_s,
         scan_share=scan_share,
         sweep=sweep,
+        clock_s=clock_std_s(rays, sources),
     )
     slope_std, offset_std = _persistent(rays, climate, states, means, fits, sources)
     speed, direction = regress_speed(climate, means), regress_direction(climate, means)

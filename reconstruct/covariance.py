@@ -16,7 +16,9 @@ import numpy as np
 from geometry.arrays import ArrayLike, FloatArray, IntArray
 from geometry.beams import unit_vector
 from reconstruct.correlation import correlation
-from reconstruct.patches import Air, Patches, pair_correlations, self_correlations
+from reconstruct.footprints import Air, Patches
+from reconstruct.own_patch import self_correlations
+from reconstruct.patches import pair_correlations
 from reconstruct.rays import Rays
 from reconstruct.spectra import Turbulence
 from reconstruct.wind import WindState
@@ -64,7 +66,7 @@ def lag_covariance(
     >>> lag_covariance(stare, wind, air, [0, 1])[0, :, 0, 0].round(3)
     array([0.832, 0.507])
     """
-    return lag_covariances(rays, [wind], turbulence, lags, sweep=sweep)[0]
+    return np.asarray(lag_covariances(rays, [wind], turbulence, lags, sweep=sweep)[0])
 
 
 def lag_covariances(
@@ -107,7 +109,7 @@ def target_covariance(
         (pass, time, ray, 2) covariance [m²/s²] with the downwind component at the target, and with the one to
         its left.
     """
-    return target_covariances(rays, [wind], turbulence, times_s, sweep=sweep)[0]
+    return np.asarray(target_covariances(rays, [wind], turbulence, times_s, sweep=sweep)[0])
 
 
 def target_covariances(

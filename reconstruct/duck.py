@@ -52,6 +52,9 @@ def bounded_duck(
         config["temp_directory"] = str(spill)
     connection = duckdb.connect(":memory:" if path is None else str(path), read_only=read_only, config=config)
     try:
+        connection.execute(
+            "SET enable_progress_bar = false"
+        )  # it would stand among the results on standard output
         yield connection
     finally:
         connection.close()

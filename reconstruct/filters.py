@@ -234,18 +234,22 @@ class Goodness(NamedTuple):
     reduced_chi2: FloatArray  # (...,) squared residuals over the rays to spare and the noise's variance
 
 
-def goodness(fit: Retrieval, radial_speed_mps: FloatArray, *, noise_mps: float) -> Goodness:
+def goodness(
+    fit: Retrieval, radial_speed_mps: FloatArray, *, noise_mps: float, weights: FloatArray | None = None
+) -> Goodness:
     """Judge the fit of each scan.
 
     Parameters
     ----------
     fit : Retrieval
-        Of unweighted rays.
+        Of each scan.
     radial_speed_mps : numpy.ndarray
         (..., ray) what was fitted [m/s].
     noise_mps : float
         Standard deviation of one radial speed [m/s], above 0: the instrument's, and turbulence if it is to
-        count as noise.
+        count as noise. Of weighted rays that of one of weight one.
+    weights : numpy.ndarray, optional
+        (..., ray) with which the rays were fitted; default: all alike.
 
     Notes
     -----
@@ -268,9 +272,10 @@ def goodness(fit: Retrieval, radial_speed_mps: FloatArray, *, noise_mps: float) 
         )
     columns = fit.wind_mps.shape[-1]
     known = np.isfinite(radial_speed_mps)
-    rays = np.count_nonzero(known, axis=-1)
-    mean = np.sum(radial_speed_mps, axis=-1, where=known) / np.maximum(rays, 1)
-    about = np.sum(np.square(radial_speed_mps - mean[..., None]), axis=-1, where=known)
+    weight = known.astype(float) if weights is None else np.where(known, weights, 0.0)
+    rays, whole = np.count_nonzero(weight, axis=-1), np.sum(weight, axis=-1)
+    mean = np.sum(weight * radial_speed_mps, axis=-1, where=known) / np.where(whole > 0, whole, 1.0)
+    about = np.sum(weight * np.square(radial_speed_mps - mean[..., None]), axis=-1, where=known)
     squares = np.square(fit.residual_std_mps) * (rays - columns)
     with np.errstate(divide="ignore", invalid="ignore"):
         explained = np.where(about > 0, 1.0 - squares / about, np.nan)

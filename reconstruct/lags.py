@@ -12,7 +12,10 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 
 GROWTH = 0.1
-"""Of the distance between two lags with that from the scan: right to 2e-5 of the variance (tested)."""
+"""Of the distance between two lags with that from the scan: the scatter of a ten-minute mean is right to 4e-4 for two
+rays two degrees apart (tested), whose fit enlarges every jump between two rules of `patches`, and 5e-3 for two lidars
+that meet at the target, where it is a hundredth of the wind's own.
+"""
 
 
 class Lags(NamedTuple):

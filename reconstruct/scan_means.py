@@ -173,7 +173,7 @@ def _times(period: Period) -> tuple[FloatArray, FloatArray]:
     """Times (time,) of the target since the start of a scan, and how much each counts (pass, time)."""
     rays, averaging = period.rays, period.averaging_s
     middle = 0.5 * float(np.min(rays.time_s) + np.max(rays.time_s))
-    reach = min(averaging, period.reach_s + rays.period_s)
+    reach = min(averaging, period.reach_s + rays.period_s + 0.5 * float(np.ptp(rays.time_s)))
     node = np.linspace(-1.0, 1.0, TARGET_TIMES)
     scale = reach / np.sinh(CROWDING)
     times = middle + scale * np.sinh(CROWDING * node)

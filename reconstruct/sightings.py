@@ -18,11 +18,13 @@ Angle = Literal["heading_deg", "azimuth_offset_deg", "elevation_offset_deg", "pi
 # stays as it is.
 ANGLES: tuple[Angle, ...] = ("azimuth_offset_deg", "elevation_offset_deg", "pitch_deg", "roll_deg")
 
+TURNS: tuple[Angle, ...] = ("heading_deg", "azimuth_offset_deg")  # told by azimuths; the others by elevations
+
 # Singular values under this share of the largest: what is solved for cannot be told apart at all.
 RANK_SHARE = 1e-6
 
-# Dilution of precision: how many times worse an angle comes out than the best target is measured, by the bearings
-# alone. Up to 5 is called good where positions are found by satellites (Langley 1999, GPS World 10 (5), 52-59);
+# Dilution of precision: how many times worse an angle comes out than the best azimuth (or, of a tilt, elevation) is
+# measured, by the bearings alone. Up to 5 is called good where positions are found by satellites (Langley 1999, GPS World 10 (5), 52-59);
 # bearings of 0, 30 and 60 degrees have 8, of 0, 45 and 90 have 3.4, all around 0.8, three in a line infinity.
 GOOD_DILUTION = 5.0
 
@@ -126,10 +128,12 @@ def undetermined(
         return solve
     level = [_at_horizon(item, start or Mounting()) for item in sightings]
     stds = predicted_std_deg(level, start=start, solve=solve, head_std_m=head_std_m)
-    factor = whitening(level, list(range(len(level))), head_std_m)[1]
-    measured_deg = float(np.linalg.norm(factor, axis=1).min())
+    known, factor = whitening(level, list(range(len(level))), head_std_m)
+    measured = np.linalg.norm(factor, axis=1)
+    across, upward = (float(measured[known % 2 == axis].min(initial=np.inf)) for axis in (0, 1))
+    best = {angle: across if angle in TURNS else upward for angle in solve}
     return tuple(
-        angle for angle, std in zip(solve, stds, strict=True) if not std <= GOOD_DILUTION * measured_deg
+        angle for angle, std in zip(solve, stds, strict=True) if not std <= GOOD_DILUTION * best[angle]
     )
 
 

@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.beams import beam_to
 from geometry.errors import InputError
 from geometry.head import Mounting
 from reconstruct.sightings import ANGLES, Angle, Sighting, predicted_std_deg, undetermined
 
 MAX_CANDIDATES = 12  # 220 sets of three
+SECTOR_DEG = 360.0 / MAX_CANDIDATES
 
 
 class Choice(NamedTuple):
@@ -21,6 +23,8 @@ class Choice(NamedTuple):
     std_deg: tuple[float, ...]  # of each angle; infinite where the targets tell nothing
     solved: tuple[Angle, ...]
     undetermined: tuple[Angle, ...]  # angles too weakly determined to be worth writing down
+    compared: int  # candidates of which every set was tried
+    candidates: int  # that there were
 
     @property
     def worst_deg(self) -> float:
@@ -41,7 +45,8 @@ def best_targets(
     Parameters
     ----------
     sightings : sequence of Sighting
-        Candidates with the head angles and uncertainties that are expected; the first twelve are looked at.
+        Candidates with the head angles and uncertainties that are expected. Of more than twelve those are compared
+        that are surest in their 30 degrees of bearing, then the next sure ones.
     count : int
         How many to choose; fewer candidates are all taken.
     start, solve, head_std_m
@@ -71,7 +76,7 @@ def best_targets(
     >>> best_targets(near).names
     ('a', 'c', 'd')
     """
-    candidates = list(sightings)[:MAX_CANDIDATES]
+    candidates = _spread(sightings)
     if not candidates or count < 1:
         raise InputError(
             f"{count} of {len(candidates)} hard targets are to be chosen; allowed: 1 or more of 1 or more"
@@ -90,7 +95,27 @@ def best_targets(
         std_deg=tuple(float(value) for value in stds[best]),
         solved=solve,
         undetermined=undetermined(chosen, start=start, solve=solve, head_std_m=head_std_m),
+        compared=len(candidates),
+        candidates=len(sightings),
     )
+
+
+def _spread(sightings: Sequence[Sighting]) -> list[Sighting]:
+    """At most twelve candidates, in their order: the surest of each sector of bearing first."""
+    if len(sightings) <= MAX_CANDIDATES:
+        return list(sightings)
+    order = sorted(range(len(sightings)), key=lambda number: _unsure_deg(sightings[number]))
+    sectors = [int(float(beam_to(item.enu_m).azimuth_deg) // SECTOR_DEG) for item in sightings]
+    first = {sectors[number]: number for number in reversed(order)}  # the surest comes last and stays
+    rest = [number for number in order if number not in first.values()]
+    kept = sorted([*first.values(), *rest][:MAX_CANDIDATES])
+    return [sightings[number] for number in kept]
+
+
+def _unsure_deg(item: Sighting) -> float:
+    """How well a target tells a direction: its map and its place together; the better of both angles."""
+    place_deg = float(np.rad2deg(item.position_std_m / np.linalg.norm(item.enu_m)))
+    return float(np.hypot(np.nanmin([item.azimuth_std_deg, item.elevation_std_deg]), place_deg))
 
 
 def _rank(std_deg: FloatArray) -> tuple[int, float, float]:

@@ -29,7 +29,7 @@ BEAM_SHARE = 0.3
 
 TAIL = 6.0  # standard deviations of the beam beyond which it is dark: 1e-9
 
-CANDIDATES = 41  # centres tried side by side in each direction
+CANDIDATES = 25  # centres tried side by side in each direction: half a standard deviation apart at the end
 REFINEMENTS = 3
 WIDE_STDS = 6.0  # half width of the next look, in standard deviations of the last one
 
@@ -131,8 +131,9 @@ def _likelihood(
     a = shares(shape, look, across[None, near] - centres[0][:, None], np.zeros((1, 1)))[0]
     e = shares(shape, look, np.zeros((1, 1)), up[None, near] - centres[1][:, None])[1]
     a, e = (np.broadcast_to(part, (CANDIDATES, kept.size)) for part in (a, e))
-    met = (a * (weights * kept)) @ e.T
-    own = np.maximum((a**2 * weights) @ (e**2).T, 1e-300)
+    # without BLAS: products as small as these are not worth its threads, which wait for each other on a busy machine
+    met = np.einsum("ar,er->ae", a * (weights * kept), e)
+    own = np.maximum(np.einsum("ar,er->ae", a**2 * weights, e**2), 1e-300)
     gain = np.where(met > 0, met**2 / own, 0.0)  # fall of the weighted squares below those of no target
     best = np.unravel_index(int(gain.argmax()), gain.shape)
     height = float(met[best] / own[best])
@@ -183,12 +184,15 @@ def _weights(
     """One over the variance of each ray: of those that miss, and more where the target scatters."""
     soft = blurred(look, 0.5 * steps[0], 0.5 * steps[1])
     centre, stds = zip(_moments(fit, 0), _moments(fit, 1), strict=True)
-    wide, high = shares(shape, soft, across - centre[0], up - centre[1])
+    near = _near(shape, soft, across, up, [fit.across_deg, fit.up_deg])
+    aside, above = across[near] - centre[0], up[near] - centre[1]
+    wide, high = shares(shape, soft, aside, above)
     full = fit.hit > 0.9 * fit.hit.max()
     left = image.power[full] - fit.height * fit.hit[full]
     scatter = float(np.median(np.abs(left))) / MAD_PER_STD
-    shaken = _shaken(shape, look, across - centre[0], up - centre[1], stds)
-    return np.asarray(1.0 / (image.noise**2 + (scatter * wide * high) ** 2 + fit.height**2 * shaken))
+    variance = np.full_like(across, image.noise**2)
+    variance[near] += (scatter * wide * high) ** 2 + fit.height**2 * _shaken(shape, look, aside, above, stds)
+    return np.asarray(1.0 / variance)
 
 
 def _shaken(

@@ -17,6 +17,7 @@ import numpy as np
 
 from geometry.arrays import ArrayLike, FloatArray
 from geometry.errors import InputError
+from reconstruct.clocks import early_and_late
 from reconstruct.covariance import wind_frame
 from reconstruct.joint import expand, speed_covariance
 from reconstruct.moments import WindMoments, wind_moments
@@ -107,6 +108,7 @@ def predict_ten_minute(
     averaging_s: float = TEN_MINUTES_S,
     scan_share: float = 1.0,
     sweep: bool = True,
+    clock_s: ArrayLike = 0.0,
 ) -> TenMinute:
     """Predict the mean over ten minutes of a scan, or of several cut from it, against a point at the target.
 
@@ -136,6 +138,10 @@ def predict_ten_minute(
         Share of the scans that are valid, above 0 to 1, lost at random.
     sweep
         Average over the head's turn and the air's way during each ray.
+    clock_s
+        Standard deviation of the lidars' clocks against that of the reference, one for all or (lidar,) [s]: what is
+        averaged carries the same stamps and is other air. The correlation with the target is sampled finely near the
+        middle of the rays: right to 1e-3 of the variance for clocks up to an eddy's passage (length over speed) off.
 
     Returns
     -------
@@ -173,6 +179,7 @@ def predict_ten_minute(
         averaging_s=averaging_s,
         scan_share=scan_share,
         sweep=sweep,
+        clock_s=clock_s,
     )[0]
 
 
@@ -189,12 +196,13 @@ def predict_ten_minutes(
     averaging_s: float = TEN_MINUTES_S,
     scan_share: float = 1.0,
     sweep: bool = True,
+    clock_s: ArrayLike = 0.0,
 ) -> list[TenMinute]:
     """Predict `predict_ten_minute` for several states of the wind: those of one speed are worked out together.
 
     Parameters
     ----------
-    rays, turbulence, gains, persistent_m2s2, reference, averaging_s, scan_share, sweep
+    rays, turbulence, gains, persistent_m2s2, reference, averaging_s, scan_share, sweep, clock_s
         See `predict_ten_minute`.
     winds
         States.
@@ -209,20 +217,32 @@ def predict_ten_minutes(
     fits = ray_fit(rays).gain if gains is None else gains
     random = [0.0] * len(winds) if random_m2s2 is None else random_m2s2
     offset = [np.zeros(2)] * len(winds) if mean_error_mps is None else mean_error_mps
-    whole = Period(rays, winds, turbulence, averaging_s, scan_share, sweep)
+    clocks = early_and_late(rays, clock_s)
     out: dict[int, TenMinute] = {}
     for group in _alike(winds, rays.count):
-        period = _checked(whole._replace(winds=[winds[index] for index in group]))
-        means = _means(
-            period,
-            fits,
-            [random[index] for index in group],
-            persistent_m2s2,
-            [offset[index] for index in group],
-            reference,
-        )
-        out.update(zip(group, means, strict=True))
+        some = [winds[index] for index in group]
+        errors = ([random[index] for index in group], persistent_m2s2, [offset[index] for index in group])
+        each = [
+            _means(
+                _checked(Period(late, some, turbulence, averaging_s, scan_share, sweep)),
+                fits,
+                *errors,
+                reference,
+            )
+            for late in clocks
+        ]
+        out.update((index, _mixed(winds[index], means)) for index, *means in zip(group, *each, strict=True))
     return [out[index] for index in range(len(winds))]
+
+
+def _mixed(wind: WindState, means: list[TenMinute]) -> TenMinute:
+    """The mean of predictions for clocks as likely as each other."""
+    if len(means) == 1:
+        return means[0]
+    fields = [name for name in TenMinute._fields if name != "moments"]
+    mean = {name: np.mean([getattr(each, name) for each in means], axis=0) for name in fields}
+    moments = wind_moments(wind.uv_mps, mean["vector_covariance_m2s2"], mean_error_mps=mean["mean_error_mps"])
+    return TenMinute(**mean, moments=moments)
 
 
 def _alike(winds: Sequence[WindState], rays: int) -> Iterator[list[int]]:
@@ -267,7 +287,7 @@ def _means(
 
     def of(index: int, values: FloatArray) -> FloatArray:
         """One wind, with the axes of the gains."""
-        return values[index].reshape((*shape, *values.shape[2:]))
+        return np.asarray(values[index].reshape((*shape, *values.shape[2:])))
 
     return [
         TenMinute(

@@ -7,11 +7,11 @@ matrix of the same fit: P = G (C_sources + C_turbulence) Gᵀ. At intensity 0 th
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 
 from geometry.arrays import ArrayLike, FloatArray
+from reconstruct.clocks import clock_std_s, early_and_late
 from reconstruct.covariance import lag_covariance, point_covariance
 from reconstruct.joint import expand
 from reconstruct.prediction import TEN_MINUTE_FIELDS, ScanPrediction, scan_prediction
@@ -122,7 +122,7 @@ def predict_turbulent(
     """
     gains, condition = ray_fit(rays, weights)
     lidars = wind_covariance_by_source(gains, rays, wind, sources) if sources is not None else {}
-    clocks = _clocks(rays, sources)
+    clocks = [rays] if len(rays.probes) == 1 else early_and_late(rays, clock_std_s(rays, sources))
     each = [turbulence_covariance(late, wind, turbulence, gains=gains, sweep=sweep) for late in clocks]
     whole = scan_prediction(
         "turbulent",
@@ -136,17 +136,6 @@ def predict_turbulent(
         return whole
     excess_mps = _scalar_excess_mps(wind.speed_mps, turbulence)
     return replace(whole, speed_bias_mps=whole.speed_bias_mps - excess_mps)
-
-
-def _clocks(rays: Rays, sources: ErrorSources | Sequence[ErrorSources] | None) -> list[Rays]:
-    """Rays with the clock of each lidar early and late by its standard deviation: two places for each."""
-    lidars = len(rays.probes)
-    each = [sources] * lidars if isinstance(sources, ErrorSources) or sources is None else list(sources)
-    off_s = np.array([0.0 if source is None else source.clock_s for source in each])
-    if lidars == 1 or not np.any(off_s):
-        return [rays]
-    signs = product((-1.0, 1.0), repeat=lidars)
-    return [replace(rays, time_s=rays.time_s + (np.array(sign) * off_s)[rays.lidar]) for sign in signs]
 
 
 def scalar_excess_mps(wind: WindState, turbulence: Turbulence) -> float:

@@ -135,7 +135,7 @@ def fly(
 
     Notes
     -----
-    All scans and the reference meet the same eddies of every size. The reference's samples are one second apart.
+    All scans and the reference meet the same eddies of every size. The reference's samples are half a second apart.
     """
     if not scans:
         raise InputError("there is no scan to fly: a virtual campaign needs at least one that has a target")

@@ -72,6 +72,9 @@ def _which(plan: Plan, met: Obstruction) -> str:
         return "the beam is"
     upright = plan.layout[met.scan].spec.type == "rhi"
     angles_deg = met.lost_elevation_deg if upright else met.lost_azimuth_deg
+    if plan.layout[met.scan].spec.type == "points":
+        names = [name for name, out in zip(plan.layout[met.scan].targets, met.lost, strict=True) if out]
+        return f"{met.lost_rays} of {met.rays} beams (to {', '.join(names)}) {'is' if len(names) == 1 else 'are'}"
     first, last = angles_deg[0], angles_deg[-1]
     alone = met.lost_rays == 1
     angle = f"{first:.1f}°" if alone else f"{first:.1f} to {last:.1f}°"

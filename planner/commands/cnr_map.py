@@ -72,7 +72,10 @@ def plan(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Search window, steps, gates and time of a map; and which targets fix the head best."""
+    """Where, how and how long to scan for hard targets.
+
+    Search window, rays, range gates and time of each map, what else stands in it, and which targets fix the head best.
+    """
     from typing import get_args
 
     from planner.cnr_map import choose_targets, plan_map
@@ -129,7 +132,11 @@ def simulate(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Rehearse the test: the planned maps as a head gives them that stands as is planted, for `fit` to find out."""
+    """Rehearse the test: maps of a head that is off.
+
+    The planned maps are simulated for a head that stands as is planted, with noise and with errors of the survey, for
+    `fit` to find it out.
+    """
     from numpy.random import default_rng
 
     from geometry.errors import InputError
@@ -281,7 +288,13 @@ def _choice_document(choice: "Choice | None") -> dict[str, Any] | None:
     if choice is None:
         return None
     stds = {name: number(std) for name, std in zip(choice.solved, choice.std_deg, strict=True)}
-    return {"targets": list(choice.names), "std_deg": stds, "undetermined": list(choice.undetermined)}
+    return {
+        "targets": list(choice.names),
+        "std_deg": stds,
+        "undetermined": list(choice.undetermined),
+        "compared": choice.compared,
+        "candidates": choice.candidates,
+    }
 
 
 def _print_plans(plans: "list[MapPlan]") -> None:
@@ -351,5 +364,10 @@ def _print_choice(choice: "Choice | None") -> None:
         return
     stds = ", ".join(f"{name} ±{std:.3f}°" for name, std in zip(choice.solved, choice.std_deg, strict=True))
     say(f"Best targets: {', '.join(choice.names)}; they would give {stds}.")
+    if choice.compared < choice.candidates:
+        say(
+            f"Of {choice.candidates} targets in sight {choice.compared} were compared: the surest in every 30° of bearing, "
+            "then the next sure ones."
+        )
     if choice.undetermined:
         say(f"Warning: they leave {', '.join(choice.undetermined)} undetermined.")

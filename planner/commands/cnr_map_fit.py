@@ -63,7 +63,11 @@ def fit(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Targets in measured maps, and heading, pitch, roll and offsets of the head from them."""
+    """Offsets, pitch and roll from measured maps.
+
+    Finds the target in each map, then how the head stands; names targets that contradict the others, and what has moved
+    between repeated maps. Nothing is written without --write, nor where the targets do not determine what is asked.
+    """
     from geometry.errors import InputError
     from planner.cnr_fit import fit_head, read_maps, site_keys
     from planner.cnr_map import map_probe
@@ -103,7 +107,11 @@ def level(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Pitch and roll of the head from the ranges at which low scans meet the sea."""
+    """Pitch and roll from low scans over the sea.
+
+    The range at which a low beam meets the water tells how the head is tilted. Offsets of the site file are applied
+    first; scan bearings as far apart as the water allows.
+    """
     from geometry.errors import InputError
     from planner.commands.choices import within
     from planner.commands.load import load_plan

@@ -79,7 +79,7 @@ def _template(*given: str | None) -> tuple[str, tuple[str, ...]]:
         raise InputError(
             "--crs, --layout-crs and --name go with --from LAYOUT; a new file has its own to edit"
         )
-    return site_text(), ("Put in your own positions, scans and wind; every key has its comment.",)
+    return site_text(), ("Put in your own positions, scans and wind; each key in it has its comment.",)
 
 
 def _of_layout(

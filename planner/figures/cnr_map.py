@@ -61,7 +61,7 @@ def _nearest(mapped: Mapped) -> tuple[IntArray, tuple[float, float, float, float
     ]
     grid = np.stack(np.meshgrid(*middles), axis=-1)
     _, nearest = KDTree(rays / steps).query(grid / steps)
-    return nearest, (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
+    return np.asarray(nearest), (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
 
 
 def _mosaic(axes: Any, mapped: Mapped, values: FloatArray, low: float, high: float) -> Any:

@@ -139,7 +139,7 @@ def _lost(axes: "Axes", head: FloatArray, ends: FloatArray, share: FloatArray) -
                 linestyle=(0, (3, 2)),
                 zorder=5,
             )
-    return [(shown_lines[0], "lost behind a rotor, tower, mast or obstacle")] if shown_lines else []
+    return [(shown_lines[0], "lost behind something solid or the ground")] if shown_lines else []
 
 
 def _stare(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:

@@ -63,7 +63,7 @@ def criteria_maps(found: Placement) -> bytes:
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
     high, wide = _size(found)
-    with canvas(3.4 * columns, (3.2 * high / wide + 0.9) * rows + 0.5) as figure:
+    with canvas(3.4 * columns, (3.2 * high / wide + 1.1) * rows + 0.4) as figure:
         figure.suptitle(
             "What is left over of each criterion, at the target where it is least", x=0.01, ha="left"
         )
@@ -100,7 +100,8 @@ def sight_map(found: Placement) -> bytes | None:
         _things(axes, found)
         height_m = found.task.head_height_m
         axes.set_title(
-            f"{found.task.site.name}: in sight of a head {height_m:.1f} m above the ground", parse_math=False
+            f"{found.task.site.name}: targets in sight of a head {height_m:.1f} m above the ground",
+            parse_math=False,
         )
         _legend(figure, axes, flat=False)
         return image(figure)

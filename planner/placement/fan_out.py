@@ -8,7 +8,9 @@ import hashlib
 import os
 import pickle
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from geometry.errors import InputError, UnavailableError
@@ -127,29 +129,31 @@ def _in_processes(
     from multiprocessing import get_context
 
     rest = list(batches)
-    for attempt in range(RETRIES):
-        with ProcessPoolExecutor(
-            min(processes, len(rest)),
-            mp_context=get_context("spawn"),
-            initializer=_receive,
-            initargs=(shared,),
-        ) as pool:
-            futures = {pool.submit(_work_on_shared, work, batch): batch for batch in rest}
-            try:
-                for future in as_completed(futures):
-                    result = future.result()
-                    rest.remove(futures[future])
-                    yield futures[future], result
-            except BrokenProcessPool:
-                if attempt == RETRIES - 1:
-                    raise
-        if not rest:
-            return
+    with TemporaryDirectory() as folder:
+        # in a file: a pipe to a child that dies before it reads is never written to its end
+        file = Path(folder) / "shared"
+        file.write_bytes(pickle.dumps(shared))
+        for _ in range(RETRIES):
+            with ProcessPoolExecutor(
+                min(processes, len(rest)), get_context("spawn"), _receive, (str(file),)
+            ) as pool:
+                futures = {pool.submit(_work_on_shared, work, batch): batch for batch in rest}
+                with suppress(BrokenProcessPool):
+                    for future in as_completed(futures):
+                        result = future.result()
+                        rest.remove(futures[future])
+                        yield futures[future], result
+            if not rest:
+                return
+    raise UnavailableError(
+        f"the processes of this search died {RETRIES} times; a script needs the usual `if __name__ == '__main__':` around "
+        "what it calls, and memory may be short"
+    )
 
 
-def _receive(shared: Any) -> None:
+def _receive(file: str) -> None:
     global _shared
-    _shared = shared
+    _shared = pickle.loads(Path(file).read_bytes())
 
 
 def _work_on_shared(work: Work, batch: Batch) -> Any:

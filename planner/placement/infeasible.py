@@ -7,6 +7,9 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from planner.placement.maps import CRITERIA, Look
 from planner.placement.task import Task
+from reconstruct.beam_table import BeamTable
+
+CROSSED = 200  # candidates whose pairs are looked at for how far they cross
 
 HINTS = {
     "area": "allow more ground (site file: areas)",
@@ -21,7 +24,7 @@ HINTS = {
 }
 
 
-def refusal(task: Task, seen: Look, fixed: Sequence[BoolArray]) -> str:
+def refusal(task: Task, seen: Look, fixed: Sequence[BeamTable]) -> str:
     """Why no set of the candidates is allowed, in words.
 
     Parameters
@@ -31,15 +34,15 @@ def refusal(task: Task, seen: Look, fixed: Sequence[BoolArray]) -> str:
     seen
         The criteria of every candidate.
     fixed
-        (target, 1) of every lidar that stands: what it can measure.
+        What every lidar that stands can measure, one candidate each.
     """
-    blind = _blind_fixed(task, fixed)
+    blind = _blind_fixed(task, [table.seen for table in fixed])
     if blind:
         return blind
     broken = {name: ~np.all(values >= 0.0, axis=0) for name, values in seen.slack.items()}
     count = len(seen.positions_m)
     if not np.logical_or.reduce(list(broken.values())).all():
-        return _no_crossing(task, count)
+        return _no_crossing(task, seen, fixed)
     alone = [name for name, out in broken.items() if out.all()]
     lines = [f"no place is allowed: none of the {count} candidates keeps to every constraint"]
     for name in alone or _removable(broken) or _blocking(broken):
@@ -59,13 +62,33 @@ def _blind_fixed(task: Task, fixed: Sequence[BoolArray]) -> str:
     )
 
 
-def _no_crossing(task: Task, count: int) -> str:
-    limit = task.limits.least_opening_deg
+def _no_crossing(task: Task, seen: Look, fixed: Sequence[BeamTable]) -> str:
+    limit, reached = task.limits.least_opening_deg, _widest_deg(task, seen, fixed)
+    beams = task.count + len(task.fixed)
+    lead = f"no set of places is allowed: single places are, of {len(seen.positions_m)} candidates, but"
+    if reached >= limit:
+        return f"{lead} none of them can measure every target that the others miss; move the lidars that stand (--lidar)"
     return (
-        f"no set of places is allowed: single places are, of {count} candidates, but no {task.count + len(task.fixed)} "
-        f"beams cross at {limit:g}° or more at every target; accept a smaller opening angle (--min-opening) or allow more "
-        "ground"
+        f"{lead} no {beams} beams cross at {limit:g}° or more at every target: it must give {limit - reached:.3g}° "
+        f"(some cross at {np.floor(10 * reached) / 10:g}° everywhere); accept a smaller opening angle (--min-opening) or "
+        "allow more ground"
     )
+
+
+def _widest_deg(task: Task, seen: Look, fixed: Sequence[BeamTable]) -> float:
+    """The opening angle in plan that some set keeps to at every target [deg], of some hundred candidates."""
+    allowed = np.flatnonzero(seen.allowed.all(axis=0))
+    azimuth = np.radians(seen.azimuth_deg[:, allowed[:: max(allowed.size // CROSSED, 1)]])
+    own = np.zeros(azimuth.shape)  # (target, candidate) sine of the angle with the lidar that stands best
+    for table in fixed:
+        sine = np.abs(table.east * np.cos(azimuth) - table.north * np.sin(azimuth))
+        own = np.maximum(own, np.where(table.seen, sine, 0.0))
+    best = float(own.min(axis=0).max(initial=0.0))
+    if task.count > 1:
+        mutual = np.abs(np.sin(azimuth[:, :, None] - azimuth[:, None, :]))
+        both = np.maximum(mutual, np.maximum(own[:, :, None], own[:, None, :]))
+        best = max(best, float(both.min(axis=0).max(initial=0.0)))
+    return float(np.degrees(np.arcsin(min(best, 1.0))))
 
 
 def _removable(broken: dict[str, BoolArray]) -> list[str]:

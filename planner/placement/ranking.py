@@ -105,7 +105,7 @@ def place(
     improve = Improve(task, fixed_tables(task), grid.spacing_m, cost or _free)
     error, sets = _searched(improve, seen, how, most if tier == "linear" else JUDGED)
     if not len(sets.members):
-        raise InputError(refusal(task, seen, [table.seen for table in improve.fixed]))
+        raise InputError(refusal(task, seen, improve.fixed))
     found = [refined(improve, seen.positions_m[members, :2]) for members in sets.members]
     near_m = APART_CELLS / 2 * grid.spacing_m
     apart = _apart(found, near_m)

@@ -6,6 +6,7 @@ ray of time and by half of what the head turns in it. Other files are taken as s
 otherwise.
 """
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,10 +26,10 @@ from reconstruct.formats.netcdf_names import (
     PITCH,
     RANGE,
     ROLL,
-    SPEED,
     SWEEP,
     TIME,
     find,
+    find_speed,
     floats,
     times,
     to_number,
@@ -117,7 +118,7 @@ def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
         ]
     except Exception as error:  # of a damaged file the libraries raise whatever breaks first
         raise InputError(f"{path}: cannot be read as netCDF ({error})") from error
-    held = [data for data in opened if find(data, SPEED) is not None and find(data, AZIMUTH) is not None]
+    held = [data for data in opened if find_speed(data) is not None and find(data, AZIMUTH) is not None]
     if not held:
         raise InputError(
             f"{path}: holds no radial speeds with azimuths; it has "
@@ -168,7 +169,7 @@ def _sweep(data: "xr.Dataset", root: dict[str, Any], path: Path, options: Option
         raise InputError(f"{path}: no ray has a time and angles")
     azimuth_deg, elevation_deg, turned = folded(azimuth[0][order], elevation[0][order])
     attributes = {**root, **data.attrs}
-    said = attributes.get("instrument_name") or attributes.get("serial_number") or path.stem.split(".")[0]
+    said = attributes.get("instrument_name") or attributes.get("serial_number") or _named(path)
     records = Records(
         time_utc=time[order] + seconds_delta(options.clock_offset_s),
         duration_s=_durations(data, len(time), path)[order],
@@ -185,6 +186,17 @@ def _sweep(data: "xr.Dataset", root: dict[str, Any], path: Path, options: Option
     )
     comments = " ".join(str(data[find(data, names)].attrs) for names in (TIME, AZIMUTH))
     return to_middle(records, stamp_of(attributes, comments, options.stamp))
+
+
+def _named(path: Path) -> str:
+    """The instrument by the file's name without its date, or by its folder.
+
+    Examples
+    --------
+    >>> _named(Path("rt1.lidar.z02.b0.20230801.000001.user1.nc")), _named(Path("mast_A/20230801_0100.nc"))
+    ('rt1.lidar.z02.b0', 'mast_A')
+    """
+    return re.split(r"[._-]?\d{6,}", path.stem)[0] or path.parent.name
 
 
 def _angle(data: "xr.Dataset", names: tuple[str, ...], rays: int, path: Path) -> tuple[FloatArray, list[str]]:

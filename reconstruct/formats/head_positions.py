@@ -8,6 +8,7 @@ import numpy as np
 from geometry.angles import wrap_180_deg
 from geometry.arrays import BoolArray, FloatArray
 from reconstruct.formats.text import lines_of, number_tables
+from reconstruct.formats.time_order import forward
 from reconstruct.losses import Loss
 
 #: Fields of a scanner file: id; azimuth; elevation; counter.
@@ -47,6 +48,10 @@ def read_positions(path: Path) -> tuple[Positions, list[Loss]]:
     values = [t.values[:, :3] for t in tables if t.values.shape[1] >= 3]
     rows = np.concatenate(values) if values else np.empty((0, 3))
     rows = rows[np.all(np.isfinite(rows), axis=1)]
+    runs = forward(rows[:, 0].astype("int64"))  # a counter that begins again would mix two times
+    if not runs.all():
+        losses.append(Loss(path.name, "a position whose counter runs backwards", times=int(np.sum(~runs))))
+    rows = rows[runs]
     _, first = np.unique(rows[:, 0], return_index=True)
     rows = rows[first]
     spikes = _spikes(rows[:, 1]) | _spikes(rows[:, 2])
@@ -88,7 +93,7 @@ def ray_positions(log: Positions, start_id: FloatArray, stop_id: FloatArray) -> 
     inside = np.searchsorted(log.id, stop_id, "right") - np.searchsorted(log.id, start_id, "left")
     first, last = (log.id[0], log.id[-1]) if len(log.id) else (np.inf, -np.inf)
     reach = (np.minimum(stop_id, last) - np.maximum(start_id, first)) / length
-    covered = (reach >= LEAST_COVER) & (inside >= 2)
+    covered = (reach >= LEAST_COVER) & (inside >= 2) & forward(start_id.astype("int64"))
     if not np.any(covered):
         blank = np.full(len(start_id), np.nan)
         return RayPositions(blank, blank, covered, standing=False)

@@ -103,11 +103,22 @@ def _gates(lines: list[str], scan: str, length: float, points: float) -> tuple[f
     stated = _FORMULA.search("\n".join(lines).lower().replace(",", "."))
     if stated is not None and float(stated[1]) > 0 and float(stated[2]) > 0:
         first, spacing, why = length / float(stated[1]), float(stated[2]), "as the header's formula says"
-    elif _OVERLAPPING.search(scan.lower()):
+    elif overlapping(scan):
         first, spacing, why = length / 2, length / points, "one sample apart, as the scan type says"
     else:
         return length / 2, length, []
     return first, spacing, [f"gates overlap: centres at {first:g} m + {spacing:g} m a gate, {why}"]
+
+
+def overlapping(scan: str) -> bool:
+    """Whether a scan type says that its gates overlap.
+
+    Examples
+    --------
+    >>> overlapping("Stare - overlapping"), overlapping("User file 5 - csm-nonoverlapping")
+    (True, False)
+    """
+    return _OVERLAPPING.search(scan.lower()) is not None
 
 
 def _number(said: dict[str, str], name: str, path: Path) -> float:

@@ -10,7 +10,18 @@ from geometry.arrays import FloatArray
 from geometry.errors import InputError
 from reconstruct.formats.carrier_to_noise import cnr_from_intensity
 from reconstruct.formats.gate_union import GateBlock, common_gates
-from reconstruct.formats.netcdf_names import CNR, INTENSITY, QUALITY, RANGE, SPEED, TIME, WIDTH, find, floats
+from reconstruct.formats.hpl_header import overlapping
+from reconstruct.formats.netcdf_names import (
+    CNR,
+    INTENSITY,
+    QUALITY,
+    RANGE,
+    TIME,
+    WIDTH,
+    find,
+    find_speed,
+    floats,
+)
 from reconstruct.losses import Loss
 
 if TYPE_CHECKING:
@@ -111,6 +122,8 @@ def read_gates(data: "xr.Dataset", rays: int, path: Path) -> Gates:
 def _ranges(data: "xr.Dataset", path: Path) -> tuple[FloatArray, list[str]]:
     """Ranges (gate,) or (ray, gate) [m], and what was turned."""
     name = find(data, RANGE)
+    if "distance_overlapped" in data.variables and overlapping(str(data.attrs.get("Scan type", ""))):
+        name = "distance_overlapped"  # beside `distance` in files of the Wind Data Hub
     ranges, notes = in_units(data, name, "m")
     numbered = ranges.ndim == 1 and len(ranges) > 3 and np.all(np.diff(ranges) == 1) and ranges[0] in (0, 1)
     if numbered and not data[name].attrs.get("units"):
@@ -126,7 +139,7 @@ def _rays_first(values: FloatArray, data: "xr.Dataset", name: str) -> FloatArray
 
 def _speed(data: "xr.Dataset", rays: int, ranges: FloatArray, path: Path, notes: list[str]) -> FloatArray:
     """(ray, gate) radial speed [m/s], positive away."""
-    name = find(data, SPEED)
+    name = find_speed(data)
     speed, said = in_units(data, name, "m/s")
     notes += said
     attributes = data[name].attrs

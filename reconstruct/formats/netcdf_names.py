@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 TIME = ("time", "timestamp", "time_offset")
 AZIMUTH = ("azimuth", "azi", "azimuth_angle", "sensor_azimuth_angle", "ray_azimuth_angle")
 ELEVATION = ("elevation", "ele", "elevation_angle", "sensor_elevation_angle", "ray_elevation_angle")
-RANGE = ("range", "range_gate", "gate_range", "distance", "radial_distance", "projection_range_coordinate")
+RANGE = ("range", "distance", "radial_distance", "gate_range", "range_gate", "projection_range_coordinate")
 SPEED = (
     "radial_wind_speed",
     "radial_velocity",
@@ -77,6 +77,18 @@ def find(data: "xr.Dataset", names: tuple[str, ...]) -> str | None:
         if data[variable].attrs.get("standard_name") in names:
             return str(variable)
     return None
+
+
+def find_speed(data: "xr.Dataset") -> str | None:
+    """Name of the variable with the radial speeds.
+
+    A `wind_speed` is one beside a signal strength: so the files of the Wind Data Hub call it, that
+    github.com/StefanoWind/FIEXTA (lidargo) makes of HALO's.
+    """
+    named = find(data, SPEED)
+    if named is None and "wind_speed" in data.variables and data["wind_speed"].ndim == 2:
+        return "wind_speed" if find(data, (*CNR, *INTENSITY)) else None
+    return named
 
 
 def floats(data: "xr.Dataset", name: str | None) -> FloatArray:

@@ -236,8 +236,9 @@ def _unknown(path: Path) -> str:
 
 def _said(records: Records, found: str, asked: Kind | None) -> Records:
     """Records that say what their file was taken for."""
-    how = "recognised as" if asked is None else "read, as asked, as"
-    note = f"{how} {LABELS[found]}" + (" (`kind` says otherwise)" if asked is None else "")
+    note = (
+        f"read, as asked, as {LABELS[found]}" if asked else f"recognised as {LABELS[found]}: `kind` overrules"
+    )
     return replace(records, notes=(note, *records.notes))
 
 

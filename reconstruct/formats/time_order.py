@@ -53,7 +53,7 @@ def time_order(time_utc: TimeArray, where: str, lines: IntArray | None = None) -
     stamps = time_utc.astype("int64")
     if np.any(np.diff(stamps[known]) < 0):
         places = np.flatnonzero(known)
-        against = ~_forward(stamps[known])
+        against = ~forward(stamps[known])
         alone = _in_short_runs(against)
         damaged = np.zeros(len(time_utc), dtype=bool)
         damaged[places[alone]] = True
@@ -67,8 +67,16 @@ def time_order(time_utc: TimeArray, where: str, lines: IntArray | None = None) -
     return TimeOrder(stay[np.argsort(stamps[stay], kind="stable")], losses, notes)
 
 
-def _forward(stamps: IntArray) -> BoolArray:
-    """(ray,) whether a ray belongs to the longest series that does not run backwards (patience sorting)."""
+def forward(stamps: IntArray) -> BoolArray:
+    """(ray,) whether a ray belongs to the longest series that does not run backwards (patience sorting).
+
+    Examples
+    --------
+    >>> forward(np.array([1, 2, 9, 3, 3, 4]))
+    array([ True,  True, False,  True,  True,  True])
+    """
+    if not np.any(np.diff(stamps) < 0):
+        return np.ones(len(stamps), dtype=bool)
     ends: list[int] = []  # smallest stamp that a series of each length ends with
     last: list[int] = []  # ray it belongs to
     before = np.full(len(stamps), -1, dtype=np.intp)

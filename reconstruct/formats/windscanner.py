@@ -158,7 +158,7 @@ def _from_positions(records: Records, found: RayPositions) -> Records:
     note = f"angles from the scanner file: {what}; the stored azimuths lead by {lead:.2f} deg (median)"
     missed = int(np.sum(~found.covered))
     if missed:
-        note += f"; {missed} rays are not in it and are turned back by the median"
+        note += f"; of {missed} of {records.rays} rays it has nothing: they are turned back by the median"
     turned = replace(
         records, azimuth_deg=azimuth, elevation_deg=elevation, sweep_id=sweep_ids(azimuth, elevation)
     )

@@ -1,6 +1,6 @@
 """Memory of a retrieval from the store, however long the campaign; speed of reading from DuckDB and MariaDB.
 
-Run: python tests/benchmarks/bench_store.py [--days 7], from the root. LIDARPLAN_TEST_MARIADB names a server to try, an
+Run: python tests/benchmarks/bench_store.py [--days 2], from the root. LIDARPLAN_TEST_MARIADB names a server to try, an
 empty database as SQLAlchemy writes it; without it an SQLite file stands in.
 
 Memory is what the system says of a process of its own at its largest (VmHWM), everything imported included.
@@ -75,7 +75,7 @@ class Spent(NamedTuple):
 
 
 def write_campaign(
-    folder: Path, kind: Kind, rays: int, *, gates: int = 41, chunk_rays: int = 500_000, seed: int = 1
+    folder: Path, kind: Kind, rays: int, *, gates: int = 41, chunk_rays: int = 200_000, seed: int = 1
 ) -> Path:
     """A synthetic campaign in a store, made a tenth of a day at a time; its campaign file."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,7 +206,7 @@ def bench_database(folder: Path) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--days", type=float, default=7.0, help="length of the shorter campaign [7]")
+    parser.add_argument("--days", type=float, default=2.0, help="length of the shorter campaign [2]")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as where:
         bench_duckdb_read(Path(where))

@@ -263,6 +263,33 @@ def test_variance_of_a_sweeping_ray_is_the_integral_over_its_patch(length_m, ran
     assert got == pytest.approx(patch_variance(length_m, math.radians(2.0) * range_m), rel=share)
 
 
+@pytest.mark.parametrize("back_and_forth", [False, True])
+@pytest.mark.parametrize(
+    ("length_m", "range_m"),
+    [(1.0, 1000.0), (10.0, 1000.0), (30.0, 1e4), (170.0, 1e4), (1.0, 1e5), (10.0, 1e5)],
+)
+def test_a_patch_that_is_swept_again_at_once_is_the_same_patch(length_m, range_m, back_and_forth):
+    """In air that hardly moves the next scan sees in each ray what this one saw, from two lengths a sweep to 3500."""
+    rays = replace(ray_set(60.0, 30, range_m=range_m), back_and_forth=back_and_forth)
+    again = lag_covariance(rays, WindState(1e-6, 0.0), Turbulence(1.0, length_m), [1])[0, 0] / 1e-12
+    want = patch_variance(length_m, math.radians(2.0) * range_m)
+    np.testing.assert_allclose(np.diagonal(again), want, rtol=0.02)
+
+
+@pytest.mark.parametrize(("length_m", "range_m"), [(1.0, 1e5), (10.0, 1e5), (10.0, 1e4)])
+def test_ten_minutes_of_eddies_smaller_than_a_sweep_are_as_many_scans_of_noise(length_m, range_m):
+    """Along the axis no air is seen twice: the variance is that of one scan over their number, and above 0. Back and
+    forth the rays at the turn see theirs twice, which adds some.
+    """
+    rays, wind, air = ray_set(60.0, 30, range_m=range_m), WindState(10.0, 0.0), Turbulence(0.01, length_m)
+    fit = gain(rows(rays.azimuth_deg, rays.elevation_deg))
+    one = patch_variance(length_m, math.radians(2.0) * range_m) * 0.01 * (fit @ fit.T)[1, 1]
+    once = float(predict_ten_minute(rays, wind, air).lidar_variance_m2s2)
+    assert once == pytest.approx(one / 48, rel=0.05)
+    twice = predict_ten_minute(replace(rays, back_and_forth=True), wind, air).lidar_variance_m2s2
+    assert once < float(twice) < 1.3 * once
+
+
 def test_eddies_of_one_metre_are_noise():
     """Rays that share no eddy: P = G diag(variance of a ray) Gᵀ."""
     rays = ray_set(60.0, 30)

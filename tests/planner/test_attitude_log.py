@@ -51,10 +51,10 @@ COMPASS = 321.4  # what the compass says of the heading at the beginning: a numb
 
 
 def drifting(folder: Path, *, scatter_deg: float = 0.0, pitch_deg: float = 0.0, log: bool = True) -> Path:
-    """Rays of a steady wind, a scan in ten minutes over three days, in three files; the campaign file."""
+    """Rays of a steady wind, three scans an hour over three days, in three files; the campaign file."""
     layout = Plan(parse_site(SITE)).layout["sector"]
-    scans = DAYS * 144
-    seconds = np.add.outer(np.arange(scans) * 600.0, 0.4 * np.arange(30) + 0.2).ravel()
+    scans = DAYS * 72
+    seconds = np.add.outer(np.arange(scans) * 1200.0, 0.4 * np.arange(30) + 0.2).ravel()
     turned = PER_DAY * seconds / 86_400.0
     true = np.tile(layout.scan.azimuth_deg, scans), np.tile(layout.scan.elevation_deg, scans)
     wind = -SPEED * unit_vector(FROM, 0.0)
@@ -99,7 +99,7 @@ def run(path: Path, more: str) -> tuple[Retrieved, np.ndarray]:
     path.write_text(CAMPAIGN.replace("MORE", more), encoding="utf-8")
     found = retrieve(load_campaign(path))
     means = pd.read_csv(path.parent / "results" / "means_600s.csv")
-    assert len(means) == DAYS * 144
+    assert len(means) == DAYS * 72
     return found, (means["from_deg"].to_numpy() - FROM + 180.0) % 360.0 - 180.0
 
 
@@ -133,7 +133,7 @@ def test_the_drift_is_reported_whether_it_is_followed_or_not(clean: Path, use: s
     assert table["angle"].tolist() == ["heading_deg", "pitch_deg"]
     assert table["per_day_deg"][0] == pytest.approx(PER_DAY, abs=1e-4)
     log = (clean.parent / "results" / "retrieve.log").read_text(encoding="utf-8")
-    assert "drift +1.000 ± 0.000° a day over 432 means of ten minutes (significant at 5 %)" in log
+    assert "drift +1.000 ± 0.000° a day over 216 means of ten minutes (significant at 5 %)" in log
 
 
 def test_a_separate_log_is_followed_by_its_columns_and_signs(clean: Path) -> None:
@@ -156,9 +156,9 @@ def test_the_reference_of_the_log_may_be_given(clean: Path) -> None:
 
 
 def test_the_scatter_of_a_compass_is_not_given_to_the_rays(tmp_path: Path) -> None:
-    """A third of a degree from sample to sample, 30 samples in ten minutes here, so 360 in two hours."""
+    """A third of a degree from sample to sample, 30 samples in twenty minutes here, so 360 in four hours."""
     path = drifting(tmp_path, scatter_deg=0.3)
-    _, smooth = run(path, "attitude: {smooth_s: 7200}")
+    _, smooth = run(path, "attitude: {smooth_s: 14400}")
     _, raw = run(path, "attitude: {smooth_s: 0}")
     assert np.std(smooth) < 0.5 * np.std(raw)
 

@@ -59,3 +59,21 @@ def test_a_reference_that_is_not_declared_is_named_and_one_that_is_counts():
     declared = Plan(site.model_copy(update={"masts": (mast,)})).budgets[0]
     assert entry(declared, "reference").speed_std_mps == pytest.approx(0.1)
     assert np.isfinite(declared.entries[-1].speed_std_mps)
+
+
+def test_clock_adds_what_the_air_changes_in_its_error():
+    """A single lidar 5 s off: small beside the turbulence between scan and target, and more at 10 s."""
+    site = load_site(HOVSORE)
+
+    def off_s(seconds):
+        lidars = [
+            lidar.model_copy(
+                update={"uncertainty": lidar.uncertainty.model_copy(update={"clock_s": seconds})}
+            )
+            for lidar in site.lidars
+        ]
+        return Plan(site.model_copy(update={"lidars": tuple(lidars)})).budgets[0]
+
+    assert all("clock" not in item.source for item in off_s(0.0).entries)
+    one, other = (entry(off_s(seconds), "clock of the lidar") for seconds in (5.0, 10.0))
+    assert 0 < one.speed_share < other.speed_share < 0.2

@@ -1,11 +1,15 @@
 """A campaign file: what is read, and how each fault is told."""
 
+import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from geometry.errors import InputError
+from planner.campaign import Campaign
 from planner.files.yaml_campaign import load_campaign
+from planner.nouns import Noun
 
 SITE = """\
 name: Moor
@@ -126,3 +130,25 @@ def test_what_is_no_campaign_is_one_message(folder: Path, text: str) -> None:
         load_campaign(folder / "none.yaml")
     with pytest.raises(InputError, match="this is a folder"):
         load_campaign(folder)
+
+
+def test_all_of_the_studys_configuration_has_its_place() -> None:
+    """Every key that the table in docs/study_configuration.md names is one of the campaign file."""
+    page = Path(__file__).parents[2] / "docs" / "study_configuration.md"
+    rows = [
+        line.split("|")[2] for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| ")
+    ]
+    keys = [key for row in rows for key in re.findall(r"`([a-z_.]+)`", row)]
+    assert len(keys) > 20
+    for key in keys:
+        noun: object = Campaign
+        for part in key.split("."):
+            fields = next(each for each in nouns_in(noun) if part in each.model_fields).model_fields
+            noun = fields[part].annotation
+
+
+def nouns_in(annotation: object) -> list[type[Noun]]:
+    """The nouns that an annotation is made of."""
+    if isinstance(annotation, type) and issubclass(annotation, Noun):
+        return [annotation]
+    return [noun for part in get_args(annotation) for noun in nouns_in(part)]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from geometry.angles import difference_deg
+from geometry.beams import unit_vector
 from geometry.errors import InputError
 from geometry.gates import Probe
 from geometry.head import Mounting
@@ -24,6 +25,8 @@ from planner.hard_targets import sought
 from planner.places import Places
 from reconstruct.cnr_map import CnrMap
 from reconstruct.hard_target import find_target
+from reconstruct.sightings import Sighting
+from reconstruct.target_choice import best_targets
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBE = Probe(pulse_ns=200, window_ns=256)
@@ -163,6 +166,34 @@ def test_targets_around_are_chosen_and_targets_in_one_direction_are_warned_of(pl
     warned = choose_targets(few, "L")
     assert warned is not None
     assert {"pitch_deg", "roll_deg"} <= set(warned.undetermined)
+
+
+def test_of_many_targets_those_of_every_bearing_are_compared() -> None:
+    """Twenty near ones in the north, two far ones to the south-east and south-west: the far ones are among the best three."""
+    seen = [
+        Sighting(
+            f"{number}",
+            800.0 * unit_vector(float(number), 5.0),
+            float(number),
+            5.0,
+            800.0,
+            0.003,
+            0.003,
+            0.1,
+            0.02,
+        )
+        for number in range(20)
+    ]
+    seen += [
+        Sighting(
+            f"{azimuth}", 1500.0 * unit_vector(azimuth, 5.0), azimuth, 5.0, 1500.0, 0.003, 0.003, 0.1, 0.05
+        )
+        for azimuth in (120.0, 240.0)
+    ]
+    choice = best_targets(seen)
+    assert {"120.0", "240.0"} <= set(choice.names)
+    assert (choice.compared, choice.candidates) == (12, 22)
+    assert choice.undetermined == ()
 
 
 def test_a_rotor_before_the_mast_at_hovsore_is_named() -> None:

@@ -291,9 +291,10 @@ def test_sheet_says_how_far_to_search_and_which_targets_fix_the_head():
     assert "Map tip at stand 2, tip of tower N, tip of tower S" in " ".join(page.all)
 
 
-def test_report_holds_the_sheet_of_each_lidar(moor):
+def test_report_holds_the_sheet_of_each_lidar(moor, monkeypatch):
     """The same page as alone, under its own heading; names stay text there too."""
     lidar = {"name": EVIL, "position": [500000, 6250000, 10], "instrument": "windcube-200s"}
+    monkeypatch.setattr("planner.scene.opengl.off_screen_window", lambda: None)
     html = report_html([moor(lidars=[lidar], scans=[], pairs=[])])
     page = page_of(html[html.index('id="sheets-1"') :])
     assert page.tags.count("article") == 1

@@ -195,8 +195,18 @@ def test_the_range_that_is_too_short_is_named_with_what_it_must_give():
 def test_beams_that_cannot_cross_steeply_enough_are_said():
     task = task_of(parse_site(SITE), count=2)
     strict = replace(task, limits=task.limits._replace(least_opening_deg=89.9))
-    with pytest.raises(InputError, match=r"cross at 89\.9° or more at every target"):
+    with pytest.raises(InputError, match=r"cross at 89\.9° or more at every target: it must give ") as caught:
         place(strict, small_grid(strict))
+    reached = float(str(caught.value).split("some cross at ")[1].split("°")[0])
+    eased = replace(task, limits=task.limits._replace(least_opening_deg=reached))
+    assert place(eased, small_grid(eased), most=1).ranked
+    for extra, allowed in (
+        (0.0, True),
+        (1.0, False),
+    ):  # no pair of the grid does better: by trial of all of them
+        azimuth = np.radians(look(task, standing_m(task, small_grid(task).places_m)).azimuth_deg)
+        sines = np.abs(np.sin(azimuth[:, :, None] - azimuth[:, None, :])).min(axis=0)
+        assert (sines.max() >= np.sin(np.radians(reached + extra))) == allowed
 
 
 def test_one_lidar_without_a_sector_scan_cannot_measure_alone():

@@ -147,6 +147,7 @@ def test_a_point_that_no_other_lidar_sees_gives_its_radial_speed_and_says_why(
     found = run(tmp_path, plan, written(tmp_path, plan, "tour A"))
     assert found.means == {}
     assert found.lost["tour A, aside"] == {"fewer rays than unknowns": PASSES}
+    assert found.offsets_deg["tour A, aside"] == pytest.approx(0.0, abs=1e-3)
     fast = table(tmp_path, "fast_tour_A__aside")
     assert fast["u_mps"].isna().all()
     assert (fast["reason"] == "fewer rays than unknowns").all()
@@ -306,4 +307,28 @@ def test_the_means_of_a_run_are_those_of_pandas_from_its_single_scans(tmp_path: 
         turn = np.degrees(np.arctan2(-grouped["u_mps"].mean(), -grouped["v_mps"].mean())) % 360
         assert means["from_deg"].to_numpy() == pytest.approx(turn.to_numpy(), abs=1e-3)
         whole = period_s // plan.layout["stare A"].scan.period_s
-        assert means["availability"].to_numpy() == pytest.approx(np.minimum(means["count"] / whole, 1), abs=1e-5)
+        assert means["availability"].to_numpy() == pytest.approx(
+            np.minimum(means["count"] / whole, 1), abs=1e-5
+        )
+
+
+def test_faint_rays_weigh_less_where_that_is_asked_for(tmp_path: Path, plan: Plan) -> None:
+    """At -25 dB the noise is more than ten times that at -10 (photons go as the signal): a wrong ray hardly counts."""
+    winds = {}
+    for weights in ("equal", "cnr"):
+        folder = tmp_path / weights
+        folder.mkdir()
+        line = written(folder, plan, "sector")
+        frame = pd.read_csv(folder / "sector.csv")
+        faint = (frame.index // len(frame["range_m"].unique())) % 5 == 0
+        frame["radial_speed_mps"] += np.where(faint, 1.0, 0.0)
+        frame["cnr_db"] = np.where(faint, -25.0, -10.0)
+        frame.to_csv(folder / "sector.csv", index=False)
+        run(folder, plan, line, more=f"sizes_deg: [60]\nweights: {weights}\n")
+        winds[weights] = table(folder, "fast_sector")
+    level = -W * np.tan(np.radians(plan.layout["sector"].axis_elevation_deg))
+    error = {name: np.abs(found["v_mps"] - (V - level)).mean() for name, found in winds.items()}
+    assert error["cnr"] < 0.2 * error["equal"]
+    assert (winds["cnr"]["r_squared"] > 0.98).all()
+    counts = json.loads((tmp_path / "cnr" / "results" / "filters.json").read_text(encoding="utf-8"))["sector"]
+    assert "CNR for its weight" in [step.get("name") for step in counts]

@@ -109,7 +109,7 @@ def test_a_steady_wind_without_errors_is_seen_as_it_is() -> None:
     period = flown([scan_of(fan(azimuth))], [wind])[0]
     wanted = -9.0 * np.cos(np.radians(230.0 - azimuth))
     np.testing.assert_allclose(period.radial_speed_mps[0], np.tile(wanted, (50, 1)), atol=1e-9)
-    np.testing.assert_allclose(period.reference_mps, np.tile(wind.uv_mps, (600, 1)), atol=1e-12)
+    np.testing.assert_allclose(period.reference_mps, np.tile(wind.uv_mps, (1200, 1)), atol=1e-12)
 
 
 def test_a_wrong_heading_stays_for_the_campaign_and_is_one_for_all_scans_of_a_lidar() -> None:

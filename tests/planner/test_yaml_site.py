@@ -108,6 +108,7 @@ FAULTS = [
     ),
     ("scans: [s, k]", "scans: [s, q]", 19, "pairs[0].scans[1]", "'q'", "s, k"),
     ("scans: [s, k]", "scans: [s]", 19, "pairs[0].scans", "['s']", "at least 2"),
+    ("scans: [s, k]", "columns: 3, scans: [s, k]", 19, "pairs[0].columns", "3", "only with three scans or more"),
     ("name: B", "name: A", 8, "lidars[1].name", "'A'", "a name that no other lidar has"),
     ("name: k", "name: s", 17, "scans[1].name", "'s'", "a name that no other scan has"),
     ("name: B", "name: 7", 8, "lidars[1].name", "7", "text"),

@@ -3,12 +3,15 @@ that the file does not hold.
 """
 
 import random
+import sqlite3
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geometry.errors import InputError
 from reconstruct.formats import ColumnMap, Options, detect, read, read_all
+from reconstruct.formats.aas_write import write_aas
 from reconstruct.formats.time_order import time_order
 
 SEED = 20140430
@@ -226,7 +229,7 @@ def test_a_folder_of_mixed_instruments_gives_a_table_each_and_counts_the_rest(tm
 def test_what_a_file_was_taken_for_is_said_with_the_way_to_overrule_it(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text(HPL, encoding="utf-8")
-    assert read(path).notes[0] == "recognised as a HALO StreamLine .hpl file (`kind` says otherwise)"
+    assert read(path).notes[0] == "recognised as a HALO StreamLine .hpl file: `kind` overrules"
     assert read(path, kind="hpl").notes[0] == "read, as asked, as a HALO StreamLine .hpl file"
 
 
@@ -273,3 +276,47 @@ def test_a_lone_stamp_is_lost_on_either_side_and_a_set_back_clock_is_sorted():
         assert found.order.tolist() == kept
         assert bool(found.notes) == sorted_
         assert sum(loss.times for loss in found.losses) == len(seconds) - len(kept)
+
+
+DATABASE = {
+    "no start": ("UPDATE control SET dt_start = NULL WHERE rowid = 5", 11, 1),
+    "a text for an angle": ("UPDATE control SET azim = 'abc' WHERE rowid = 5", 11, 1),
+    "a time that is none": ("UPDATE control SET dt_start = 1e18, dt_stop = 1e18 WHERE rowid = 5", 11, 1),
+    "ends before it begins": ("UPDATE control SET dt_stop = dt_start - 100 WHERE rowid = 5", 11, 1),
+    "a day ahead": (
+        "UPDATE control SET dt_start = dt_start + 86400, dt_stop = dt_stop + 86400 WHERE rowid = 5",
+        11,
+        1,
+    ),
+    "no gw_id": ("UPDATE control SET gw_id = NULL WHERE rowid = 5", 11, 1),
+    "a ray twice": ("INSERT INTO control SELECT * FROM control WHERE rowid = 7", 12, 1),
+    "a value twice": ("INSERT INTO measurement SELECT * FROM measurement WHERE rowid = 7", 12, 1),
+    "no distance": ("UPDATE measurement SET dist = NULL WHERE rowid = 7", 12, 1),
+    "behind the lidar": ("UPDATE measurement SET dist = -5 WHERE rowid = 7", 12, 1),
+    "no measurement": ("DELETE FROM measurement WHERE gw_id = (SELECT gw_id FROM control LIMIT 1)", 11, 1),
+    "a text for a speed": ("UPDATE measurement SET radSpeed = 'abc' WHERE rowid = 7", 12, 0),
+    "an endless speed": ("UPDATE measurement SET radSpeed = 9e999 WHERE rowid = 7", 12, 0),
+    "a text in the log": ("UPDATE system SET pitch = 'x' WHERE rowid = 2", 12, 0),
+}
+
+
+@pytest.mark.parametrize(("statement", "rays", "lost"), DATABASE.values(), ids=DATABASE)
+def test_a_damaged_row_of_the_database_costs_no_other(tmp_path, statement, rays, lost):
+    pytest.importorskip("sqlalchemy", reason="the extra 'db' is not installed")
+    (tmp_path / "a_wind.txt").write_text(WIND, encoding="utf-8")
+    whole = read(tmp_path / "a_wind.txt", options=KINDS["a_wind.txt"][1])
+    attitude = {name: np.zeros(12) for name in ("heading_deg", "pitch_deg", "roll_deg")}
+    place = tmp_path / "study.sqlite"
+    write_aas(replace(whole, **attitude), place)
+    with sqlite3.connect(place) as connection:
+        connection.execute(statement)
+    connection.close()
+    records = read(place)
+    assert records.rays == rays
+    assert sum(loss.times for loss in records.losses) == lost
+    by_time = {
+        int(t): speeds
+        for t, speeds in zip(whole.time_utc.astype("int64") // 1000, whole.radial_speed_mps, strict=True)
+    }
+    for time, speeds in zip(records.time_utc.astype("int64") // 1000, records.radial_speed_mps, strict=True):
+        assert np.all((speeds == by_time[int(time)]) | np.isnan(speeds))

@@ -4,8 +4,11 @@ Sources: [W] github.com/openradar/xradar, WindCube reader (groups, over two soft
 gates, empty groups); [L] github.com/actris-cloudnet/doppy docs/formats-wls200s.md (variables and comments);
 [K] github.com/jdiasn/lidarwind issue 110 and github.com/mkay-atm/dl_toolbox issues 3 and 4 (time reference in
 the group, in the root, in the units; azi, ele, dv); [C] CfRadial 1.3 document, NCAR, sections 4 and 5; [A] the
-header of an ARM dlppi file.
+header of an ARM dlppi file; [N] github.com/StefanoWind/FIEXTA, lidargo's
+format.py, which makes the netCDF of the Wind Data Hub.
 """
+
+import random
 
 import numpy as np
 import pytest
@@ -224,6 +227,29 @@ def test_as_many_rays_as_gates_are_not_transposed_by_mistake(tmp_path):
         np.testing.assert_array_equal(read(tmp_path / f"{name}.nc").radial_speed_mps, wanted)
 
 
+@pytest.mark.parametrize(("scan", "step"), [("User1 - csm", 30.0), ("Stare - overlapping", 1.5)])
+def test_files_of_the_wind_data_hub_are_read_from_distances_and_not_gate_numbers(tmp_path, scan, step):
+    """[N] names the line-of-sight speed wind_speed and gives both distances."""
+    gate = np.arange(4.0)
+    variables = {
+        "wind_speed": (("time", "range_gate"), np.ones((3, 4))),
+        "SNR": (("time", "range_gate"), np.full((3, 4), -15.0)),
+        "azimuth": ("time", [1.0, 2.0, 3.0]),
+        "elevation": ("time", np.full(3, 5.0)),
+        "distance": ("range_gate", 15 + 30 * gate),
+        "distance_overlapped": ("range_gate", 15 + 1.5 * gate),
+    }
+    time = np.datetime64("2023-08-01T00:00:01", "ns") + np.arange(3) * np.timedelta64(1500, "ms")
+    data = xr.Dataset(variables, {"time": time, "range_gate": gate}, {"Scan type": scan})
+    data.to_netcdf(tmp_path / "rt1.lidar.z02.b0.20230801.000001.user1.nc")
+    records = read(tmp_path / "rt1.lidar.z02.b0.20230801.000001.user1.nc")
+    np.testing.assert_array_equal(records.range_m, 15 + step * gate)
+    np.testing.assert_array_equal(records.time_utc, time)
+    data.drop_vars(["SNR"]).to_netcdf(tmp_path / "b.nc")
+    with pytest.raises(InputError, match="holds no radial speeds"):
+        read(tmp_path / "b.nc")
+
+
 def test_times_that_are_missing_or_stand_alone_are_lost_and_counted(tmp_path):
     time = np.array([0.0, 1, np.nan, 3, 900, 5, 6, 7])
     records = read(flat(tmp_path / "a.nc", time=time))
@@ -261,3 +287,20 @@ def test_a_stamp_that_is_asked_for_wins_over_what_the_file_says(tmp_path):
     path = windcube(tmp_path / "a.nc", lambda file: sweep_group(file, "Sweep_1"))
     stored = read(path, options=Options(stamp="middle"))
     np.testing.assert_allclose(stored.azimuth_deg, AZIMUTH)
+
+
+def test_no_mutation_of_a_classic_file_brings_the_reader_to_anything_but_an_input_error(tmp_path):
+    path = flat(tmp_path / "a.nc", format="NETCDF3_CLASSIC")
+    whole, dice = path.read_bytes(), random.Random(20140501)
+    for _ in range(25):
+        raw = bytearray(whole)
+        for _ in range(dice.choice([1, 3])):
+            place = dice.randrange(4, len(raw))
+            raw[place : place + dice.choice([1, 1, 9])] = bytes([dice.randrange(256)])
+        path.write_bytes(bytes(raw))
+        try:
+            records = read_cfradial(path)
+        except InputError as error:
+            assert str(path) in str(error)
+        else:
+            assert records.rays + sum(loss.times for loss in records.losses) >= RAYS

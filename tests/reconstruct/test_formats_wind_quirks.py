@@ -126,3 +126,21 @@ def test_one_damaged_position_of_the_head_turns_no_ray(tmp_path):
     records = read(path)
     np.testing.assert_allclose(records.azimuth_deg, 10 + 2.0 * np.arange(20), atol=1e-3)
     assert [loss.times for loss in records.losses] == [1]
+
+
+def test_a_counter_that_begins_again_gives_no_ray_the_position_of_another_time(tmp_path):
+    """The first 12 rays look to 10, 12, ... and the 8 after the restart to 100, 102, ... degrees."""
+    turned = [10 + 2.0 * n for n in range(12)] + [100 + 2.0 * n for n in range(8)]
+    lines = [line(n, azimuth=a) for n, a in enumerate(turned)]
+    for n in range(12, 20):
+        fields = lines[n].split(";")
+        fields[2:4] = [str(1000 + 170 * (n - 12)), str(1000 + 170 * (n - 12) + 160)]
+        lines[n] = ";".join(fields)
+    path = put(tmp_path, lines)
+    log = [(1000 + 10 * k, 10 + 2 * (10 * k - 80) / 170) for k in range(17 * 12)]
+    log += [(1000 + 10 * k, 100 + 2 * (10 * k - 80) / 170) for k in range(17 * 8)]
+    text = "\n".join(f"{count};{azimuth:.4f};9.3;1.0" for count, azimuth in log)
+    (tmp_path / "20161110233000_scanner.txt").write_text(text, encoding="utf-8")
+    records = read(path)
+    np.testing.assert_allclose(records.azimuth_deg, turned, atol=1e-3)
+    assert any(loss.what == "a position whose counter runs backwards" for loss in records.losses)

@@ -99,6 +99,33 @@ def test_a_window_across_north_is_found_as_any_other() -> None:
     assert turned.azimuth_deg == pytest.approx(plain.azimuth_deg - 192 + 0.02, abs=1e-9)
 
 
+def test_the_steps_of_a_map_are_told_whether_its_rays_share_angles_or_not() -> None:
+    """A raster, one with encoder noise along the rows, and one with noise both ways: .02° by .01° within 8 %, .0141° if even."""
+    rng = np.random.default_rng(3)
+    across, up = (each.ravel() for each in np.meshgrid(100 + np.arange(30) * 0.02, 2 + np.arange(40) * 0.01))
+    gates, dark = np.arange(10.0), np.zeros((1200, 10))
+    noise = rng.uniform(-0.004, 0.004, (2, 1200))
+    plain = CnrMap(across, up, gates, dark).step_deg
+    rows = CnrMap(across + noise[0], up, gates, dark).step_deg
+    both = CnrMap(across + noise[0], up + noise[1], gates, dark).step_deg
+    assert plain == pytest.approx((0.02, 0.01), rel=1e-6)
+    assert rows == pytest.approx((0.02, 0.01), rel=0.08)
+    assert both == pytest.approx((0.0141, 0.0141), rel=0.08)
+
+
+def test_a_gate_that_is_missing_in_every_ray_is_passed_over() -> None:
+    whole = simulated(2)
+    holes = whole.cnr_db.copy()
+    holes[:, 7] = np.nan
+    found = find_target(
+        CnrMap(whole.azimuth_deg, whole.elevation_deg, whole.range_m, holes),
+        shape="tip",
+        size_m=1.0,
+        probe=PROBE,
+    )
+    assert abs(found.azimuth_deg - 192) < 0.005
+
+
 def test_missing_rays_and_gates_move_nothing_much() -> None:
     whole = simulated(2)
     holes = np.where(np.random.default_rng(0).uniform(size=whole.cnr_db.shape) < 0.02, np.nan, whole.cnr_db)
@@ -256,6 +283,9 @@ def test_the_published_elevation_offsets_give_the_published_tilt() -> None:
     assert fit.mounting.roll_deg == pytest.approx(0.07649, abs=5e-4)
     assert fit.mounting.elevation_offset_deg == pytest.approx(0.29495, abs=5e-4)
     assert [angle for angle in fit.solved if fit.is_significant(angle)] == ["elevation_offset_deg"]
+    assert fit.coverage_factor == pytest.approx(
+        4.303, abs=0.001
+    )  # Student's table: 95 %, two angles left over
 
 
 @settings(max_examples=25, derandomize=True, deadline=None)
@@ -309,6 +339,25 @@ def test_an_outlier_is_named_and_left_out() -> None:
     assert fit.outliers == ("150",)
     assert abs(fit.mounting.azimuth_offset_deg - 12.31) < 0.01
     assert fit.residuals[2].azimuth_deg == pytest.approx(-0.2, abs=0.02)
+
+
+@pytest.mark.parametrize("elevation", [2.0, 8.0, 25.0])
+def test_three_targets_in_a_line_are_refused_however_steep(elevation: float) -> None:
+    """At 25° their azimuths alone would tell the tilt to 1.4 times the error of a map; by their bearings nothing does."""
+    seen = [sighting(f"{number}", a, elevation, Mounting()) for number, a in enumerate((10.0, 10.5, 190.0))]
+    with pytest.raises(InputError, match=r"do not determine .*(pitch|roll)"):
+        fit_mounting(seen)
+
+
+def test_targets_that_half_contradict_the_other_half_are_refused() -> None:
+    """Four maps before and four after the head turned by 0.1°: no majority, so none is called an outlier."""
+    before = [sighting(f"{a}", a, 5.0, Mounting()) for a in (0, 90, 180, 270)]
+    after = [
+        item._replace(name=f"{item.name} again", azimuth_head_deg=item.azimuth_head_deg + 0.1)
+        for item in before
+    ]
+    with pytest.raises(InputError, match="no majority of them agrees"):
+        fit_mounting([*before, *after])
 
 
 @pytest.mark.parametrize("bearings", [(10.0,), (10.0, 190.0), (10.0, 10.0, 190.0), (10.0, 10.0, 10.0)])

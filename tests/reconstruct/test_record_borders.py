@@ -101,7 +101,7 @@ def assert_same(first: Records, second: Records) -> None:
 
 
 @pytest.mark.parametrize("border", BORDERS)
-@settings(derandomize=True, max_examples=25, deadline=None)
+@settings(derandomize=True, max_examples=15, deadline=None)
 @given(data=st.data())
 def test_every_field_comes_back_as_it_went(border: str, data: st.DataObject) -> None:
     """A store keeps no table without a ray; every other border does."""

@@ -1,6 +1,7 @@
 """Ten-minute means against a direct draw of every ray of ten minutes, and against closed forms."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -232,3 +233,92 @@ def test_calm_has_speeds_but_no_direction():
     calm = predict_ten_minute(sector(), WindState(0.0, 230.0), AIR, random_m2s2=0.01)
     assert np.isfinite(calm.speed_std_mps)
     assert np.isnan(calm.direction_std_deg)
+
+
+def summed(rays, wind, late_s, length_m=170.0, step_s=1.0):
+    """Variance of the ten-minute mean along the wind, and covariance with the target's, over that of a point:
+    sums over all rays at their true times and all seconds at the target."""
+    scans = int(600 / rays.period_s)
+    stamps = rays.times_s(scans)
+    velocity = wind.vector_mps
+    along = velocity / np.linalg.norm(velocity)
+    beams = unit_vector(rays.azimuth_deg, rays.elevation_deg)
+    gain = along[:2] @ np.linalg.pinv(rows(rays.azimuth_deg, rays.elevation_deg))
+    weight = np.tile(gain / scans, scans)
+    places = np.tile(rays.centre_m, (scans, 1))
+    places = places - np.multiply.outer((stamps + late_s[rays.lidar]).ravel(), velocity)
+    vectors = np.tile(beams, (scans, 1))
+    target = -np.multiply.outer(np.arange(step_s / 2, 600, step_s), velocity)
+    variance = covariance = 0.0
+    for start in range(0, len(places), 60):
+        part = slice(start, start + 60)
+        mine = np.einsum("a,ai->ai", weight[part], vectors[part])
+        for there, theirs in (
+            (places, weight[:, None] * vectors),
+            (target, np.tile(along, (len(target), 1))),
+        ):
+            values = tensor(places[part, None] - there[None], 1.3389852790652803 * length_m)
+            total = np.einsum("ai,abij,bj->", mine, values, theirs)
+            if there is places:
+                variance += total
+            else:
+                covariance += total / len(target)
+    return np.array([variance, covariance])
+
+
+@pytest.mark.parametrize("clock_s", [6.0, 25.0])
+def test_a_lidar_whose_clock_is_off_averages_other_air(clock_s):
+    """Two stares, the second's clock early or late: both moments are the mean of two direct sums."""
+    rays, wind, air = dual(), WindState(8.0, 230.0), Turbulence(0.001, 170.0)
+    theirs = np.mean([summed(rays, wind, np.array([0.0, late])) for late in (-clock_s, clock_s)], axis=0)
+    right = summed(rays, wind, np.zeros(2))
+    ours = predict_ten_minute(rays, wind, air, sweep=False, clock_s=[0.0, clock_s])
+    got = np.array([ours.lidar_variance_m2s2, ours.covariance_m2s2]) / 0.008**2
+    np.testing.assert_allclose(got, theirs, rtol=5e-3)
+    assert abs(right[1] - theirs[1]) > 4 * abs(got[1] - theirs[1])  # the clock is what is seen
+
+
+def test_a_clock_that_is_an_hour_off_cuts_the_ties_with_the_reference():
+    """A back-and-forth scan has the same mean and scatter of its own, and nothing in common with the mast."""
+    rays, wind = sector(), WindState(8.0, 230.0)
+    right, wrong = (predict_ten_minute(rays, wind, AIR, clock_s=clock) for clock in (0.0, 3600.0))
+    assert float(wrong.lidar_mean_mps) == pytest.approx(float(right.lidar_mean_mps), rel=1e-9)
+    assert float(wrong.lidar_variance_m2s2) == pytest.approx(float(right.lidar_variance_m2s2), rel=1e-6)
+    assert float(wrong.covariance_m2s2) == pytest.approx(0.0, abs=1e-12)
+    apart = float(right.lidar_variance_m2s2 + right.reference_variance_m2s2) ** 0.5
+    assert float(wrong.speed_std_mps) == pytest.approx(apart, rel=1e-6)
+
+
+def test_two_lidars_back_and_forth_with_wrong_clocks_are_refused():
+    rays = dataclasses.replace(dual(), back_and_forth=True)
+    with pytest.raises(InputError, match="back and forth"):
+        predict_ten_minute(rays, WindState(8.0, 230.0), AIR, clock_s=1.0)
+
+
+@pytest.mark.parametrize("from_deg", [192.0, 282.0])
+def test_few_lags_stand_for_all_of_them(monkeypatch, from_deg):
+    """A narrow scan every 0.8 s, 750 of them: a fifth of the lags and all of them give one scatter."""
+    narrow = dataclasses.replace(
+        sector(2, Probe(pulse_ns=200, window_ns=256), period_s=0.8), time_s=np.array([0.2, 0.6])
+    )
+    wind = WindState(8.0, from_deg)
+    few = predict_ten_minute(narrow, wind, AIR)
+    monkeypatch.setattr("reconstruct.lags._spread", lambda every, *_: np.arange(len(every)))
+    every = predict_ten_minute(narrow, wind, AIR)
+    assert float(few.lidar_variance_m2s2) == pytest.approx(float(every.lidar_variance_m2s2), rel=1e-3)
+    assert float(few.speed_std_mps) == pytest.approx(float(every.speed_std_mps), rel=1e-3)
+
+
+@pytest.mark.parametrize("length_m", [50.0, 170.0])
+def test_tail_of_the_lateral_correlation_is_in_the_mean_at_the_target(length_m):
+    """Across the wind the correlation goes negative and comes back slowly: its whole integral, by quadrature."""
+    wind = WindState(10.0, 0.0)
+    ours = predict_ten_minute(sector(), wind, Turbulence(0.05, length_m))
+
+    def weighted(t):
+        return (1 - t / 600) * tensor(np.array([10 * t, 0.0, 0.0]), 1.3389852790652803 * length_m)[1, 1]
+
+    ends = [0, 1, 10, 60, 200, 600]
+    theirs = 2 / 600 * sum(quad(weighted, a, b, limit=200)[0] for a, b in pairwise(ends))
+    across = (np.radians(ours.reference_direction_std_deg) * 10.0 / 0.5) ** 2
+    assert across == pytest.approx(theirs, rel=2e-3)  # ending at 8 lengths it was 1 % too high

@@ -171,11 +171,13 @@ def test_lasting_errors_and_the_place_of_the_target_move_the_waves_as_they_move_
         rays,
         azimuth_deg=rays.azimuth_deg + 1.5,
         time_s=rays.time_s + 2.0,
-        head_m=rays.head_m + [30.0, 0.0, 0.0],
+        head_m=rays.head_m + np.array([30.0, 0.0, 0.0]),
         sweep_s=8.0,
     )
     errors = none._replace(
-        azimuth_deg=none.azimuth_deg + 1.5, delay_s=none.delay_s + 2.0, head_m=none.head_m + [10.0, 0.0, 0.0]
+        azimuth_deg=none.azimuth_deg + 1.5,
+        delay_s=none.delay_s + 2.0,
+        head_m=none.head_m + np.array([10.0, 0.0, 0.0]),
     )
     offset = to_wind_frame(np.array([20.0, 0.0, 0.0]), wind.from_deg)
     found = WaveSight.of(rays, wind, waves, errors, scans=4, offset_m=offset).radial_speed(amplitudes)
