@@ -32,7 +32,7 @@ from planner.clocks import ClockLag, clock_lag, trim_sonic
 from planner.files.yaml_campaign import Loaded
 from planner.kept_parts import Kept, read_kept, write_kept
 from planner.mast_file import read_mast
-from planner.output import output_folder
+from planner.output import output_folder, require_folder
 from planner.pair_retrieval import kept_series, partners_of, retrieve_pair
 from planner.plan import Plan
 from planner.pointing_log import NOTHING_KNOWN, Known, Pointed, pointed, require_log
@@ -74,6 +74,7 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
         If data cannot be read, or no scan gives any wind.
     """
     plan = Plan(loaded.site)
+    require_folder(loaded.campaign.output)
     if restart:
         shutil.rmtree(loaded.campaign.output / WORK, ignore_errors=True)
     loaded, clocks = _clocks_set(loaded, plan)

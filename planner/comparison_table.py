@@ -14,6 +14,8 @@ FORESEEN = (
     "direction_residual_std_deg",
 )  # numbers of the prediction that stand in the table
 
+FEW_PERIODS = 50  # of fewer a jackknife's standard error is itself uncertain
+
 JUDGED: tuple[tuple[str, Callable[[Row], Difference | None]], ...] = (
     ("slope", lambda row: row.slope_beside),
     ("scatter of speed", lambda row: row.scatter_beside),
@@ -71,6 +73,11 @@ def verdicts(comparison: Comparison) -> list[str]:
         )
         apart = ", ".join(f"{name_of(row)} ({found.ratio:+.1f})" for row, found in off)
         told.append(f"{head}; not in {apart}" if off else head)
+    fewest = min((row.speed.pairs for row in comparison.rows if row.slope_beside is not None), default=0)
+    if told and fewest < FEW_PERIODS:
+        told.append(
+            f"with as few as {fewest} periods the standard errors themselves are known to no better than a third"
+        )
     return told
 
 

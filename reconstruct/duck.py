@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import duckdb
 
 #: Of the pages, sorts and row groups that DuckDB holds; by itself it takes 80 % of the machine's memory.
-MEMORY = "256MB"
+MEMORY = "128MB"
 
 #: Each thread holds a row group of its own while it writes.
 MOST_THREADS = 4
@@ -20,7 +20,7 @@ MOST_THREADS = 4
 def bounded_duck(
     path: Path | None = None, *, read_only: bool = False, spill: Path | None = None
 ) -> "Iterator[duckdb.DuckDBPyConnection]":
-    """Open a connection that holds no more than 256 MB.
+    """Open a connection that holds no more than 128 MB.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def bounded_duck(
     --------
     >>> with bounded_duck() as connection:
     ...     connection.execute("SELECT current_setting('memory_limit')").fetchall()
-    [('244.1 MiB',)]
+    [('122.0 MiB',)]
     """
     import duckdb
 

@@ -24,8 +24,9 @@ TURNS: tuple[Angle, ...] = ("heading_deg", "azimuth_offset_deg")  # told by azim
 RANK_SHARE = 1e-6
 
 # Dilution of precision: how many times worse an angle comes out than the best azimuth (or, of a tilt, elevation) is
-# measured, by the bearings alone. Up to 5 is called good where positions are found by satellites (Langley 1999, GPS World 10 (5), 52-59);
-# bearings of 0, 30 and 60 degrees have 8, of 0, 45 and 90 have 3.4, all around 0.8, three in a line infinity.
+# measured, by the bearings alone. Up to 5 is called good where positions are found by satellites (Langley 1999, GPS
+# World 10 (5), 52-59); bearings of 0, 30 and 60 degrees have 8, of 0, 45 and 90 have 3.4, all around 0.8, three in a
+# line infinity.
 GOOD_DILUTION = 5.0
 
 
@@ -130,7 +131,7 @@ def undetermined(
     stds = predicted_std_deg(level, start=start, solve=solve, head_std_m=head_std_m)
     known, factor = whitening(level, list(range(len(level))), head_std_m)
     measured = np.linalg.norm(factor, axis=1)
-    across, upward = (float(measured[known % 2 == axis].min(initial=np.inf)) for axis in (0, 1))
+    across, upward = (min(measured[known % 2 == axis].tolist(), default=0.0) for axis in (0, 1))
     best = {angle: across if angle in TURNS else upward for angle in solve}
     return tuple(
         angle for angle, std in zip(solve, stds, strict=True) if not std <= GOOD_DILUTION * best[angle]

@@ -19,9 +19,11 @@ from planner.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from planner.placement.ranking import Placement
     from planner.placement.refine import SoftCost
-    from planner.placement.task import Limits
+    from planner.placement.task import Task
 
 
 def register(app: typer.Typer) -> None:
@@ -53,40 +55,53 @@ def place(
     quiet: QuietOption = False,
 ) -> None:
     """Where to put lidars: ranked places, what binds them, and maps of every criterion."""
-    from dataclasses import replace
-
     from planner.commands.choices import chosen, within
     from planner.commands.progress import shown
-    from planner.files.yaml_site import load_site
     from planner.output import require_folder
     from planner.placement.fan_out import How
     from planner.placement.maps import default_grid
     from planner.placement.ranking import place as ranked_places
-    from planner.placement.task import task_of
 
     within("--reach", reach, 0.0, open_below=True)
     within("--head-height", head_height, 0.0)
     by = chosen("--tier", tier, given.TIERS)
     require_folder(out)
-    task = task_of(
-        load_site(site),
-        fixed=None if lidar is None else tuple(lidar),
-        count=count,
-        targets=tuple(target or ()),
-    )
-    task = replace(
-        task,
-        criterion=chosen("--criterion", criterion, given.CRITERIA),
-        aggregate=chosen("--of", of, given.AGGREGATES),
-        limits=_limits(task.limits, max_range, max_elevation, min_opening, max_lost),
-        head_height_m=task.head_height_m if head_height is None else head_height,
-    )
+    limits = _limits(max_range, max_elevation, min_opening, max_lost)
+    task = _task(site, count, lidar, target or (), criterion, of, limits, head_height)
     cost = _near_cost(near, task.site.crs, near_cost)
     with shown("placing", quiet=quiet) as progress:
         how = How(scheduler=scheduler, checkpoint=resume, progress=progress)
         candidates = default_grid(task, count=grid, reach_m=reach)
         found = ranked_places(task, candidates, how=how, cost=cost, tier=by)
     _tell(found, *_written(found, out), json=json, quiet=quiet)
+
+
+def _task(
+    site: str,
+    count: int | None,
+    fixed: "Sequence[str] | None",
+    targets: "Sequence[str]",
+    criterion: str,
+    of: str,
+    limits: dict[str, float],
+    head_height: float | None,
+) -> "Task":
+    """The task that the site suggests, with what was given in its place."""
+    from dataclasses import replace
+
+    from planner.commands.choices import chosen
+    from planner.files.yaml_site import load_site
+    from planner.placement.task import task_of
+
+    standing = None if fixed is None else tuple(fixed)
+    task = task_of(load_site(site), fixed=standing, count=count, targets=tuple(targets))
+    return replace(
+        task,
+        criterion=chosen("--criterion", criterion, given.CRITERIA),
+        aggregate=chosen("--of", of, given.AGGREGATES),
+        limits=task.limits._replace(**limits),
+        head_height_m=task.head_height_m if head_height is None else head_height,
+    )
 
 
 def _written(found: "Placement", out: Path) -> tuple[list[str], str | None]:
@@ -128,13 +143,9 @@ def _tell(found: "Placement", files: list[str], lacking: str | None, *, json: bo
 
 
 def _limits(
-    limits: "Limits",
-    max_range: float | None,
-    max_elevation: float | None,
-    min_opening: float | None,
-    max_lost: float | None,
-) -> "Limits":
-    """The limits that the task suggests, with those that were given in their place."""
+    max_range: float | None, max_elevation: float | None, min_opening: float | None, max_lost: float | None
+) -> dict[str, float]:
+    """The limits that were given, by their names in `Limits`."""
     from planner.commands.choices import within
 
     within("--max-range", max_range, 0.0, open_below=True)
@@ -147,7 +158,7 @@ def _limits(
         "least_opening_deg": min_opening,
         "most_lost_share": max_lost,
     }
-    return limits._replace(**{name: value for name, value in wanted.items() if value is not None})
+    return {name: value for name, value in wanted.items() if value is not None}
 
 
 def _near_cost(file: Path | None, crs: str, per_km: float) -> "SoftCost | None":

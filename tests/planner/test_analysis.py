@@ -220,6 +220,13 @@ def test_a_run_that_is_killed_leaves_no_result_and_the_next_one_makes_the_same(t
     assert not (tmp_path / "results" / analysis.WORK).exists()
 
 
+def test_results_that_cannot_be_written_are_told_before_any_work(tmp_path: Path) -> None:
+    path = made(tmp_path, ALONE, days=1 / 144)
+    (tmp_path / "results").write_text("in the way", encoding="utf-8")
+    with pytest.raises(InputError, match="is a file; a folder is needed"):
+        retrieve(load_campaign(path))
+
+
 def test_what_an_unfinished_run_did_is_worth_nothing_with_other_settings_or_data(tmp_path: Path) -> None:
     path = made(tmp_path, days=1 / 144)
     loaded = load_campaign(path)

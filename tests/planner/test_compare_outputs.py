@@ -168,6 +168,7 @@ def test_agreement_is_judged_by_the_standard_errors_of_both(found: Comparison) -
     told = verdicts(shown)[0]
     assert told.startswith("slope: measured and predicted agree within 2 standard errors in 1 of 2 rows")
     assert "not in arc 60° (+2." in told
+    assert "as few as 6 periods" in verdicts(shown)[-1]
     assert verdicts(found) == []
 
 

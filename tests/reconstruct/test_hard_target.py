@@ -14,8 +14,7 @@ from reconstruct.cnr_simulation import Signal, simulate_cnr_map
 from reconstruct.hard_target import find_target
 from reconstruct.mounting_fit import fit_mounting
 from reconstruct.range_fit import edge_range, peak_range
-from reconstruct.sea_level import level_from_sea, sea_range_m
-from reconstruct.sightings import Sighting
+from reconstruct.sightings import Sighting, undetermined
 
 PROBE = Probe(pulse_ns=200, window_ns=256)
 SIZES_M = {"mast": 1.0, "tip": 1.0, "boom": 1.0}
@@ -210,52 +209,6 @@ def test_the_edge_of_a_surface_is_the_middle_of_the_published_curve() -> None:
     assert np.isnan(edge.range_m[50])
 
 
-def test_the_published_ranges_to_the_sea_are_met() -> None:
-    """Pitch .1° nose down, height 25 m, elevation -3°: 462.29, 477.68, 494.14 m at 0, 90, 180°."""
-    found = sea_range_m([0, 90, 180], -3.0, height_m=25.0, mounting=Mounting(pitch_deg=-0.1))
-    assert np.abs(found - [462.29, 477.68, 494.14]).max() < 0.006
-
-
-@settings(max_examples=20, derandomize=True, deadline=None)
-@given(st.floats(-2, 2), st.floats(-2, 2), st.floats(0, 360), st.floats(-8, -4))
-def test_ranges_to_a_flat_sea_are_those_of_the_published_formula(
-    pitch: float, roll: float, azimuth: float, elevation: float
-) -> None:
-    """Rott et al. (2022): there nose-down pitch and the other roll are positive."""
-    p, q, g, e = np.deg2rad([-pitch, -roll, azimuth, elevation])
-    below = np.cos(e) * (np.cos(g) * np.sin(p) - np.cos(p) * np.sin(q) * np.sin(g)) - np.cos(p) * np.cos(
-        q
-    ) * np.sin(e)
-    found = sea_range_m(azimuth, elevation, height_m=20.0, mounting=Mounting(pitch_deg=pitch, roll_deg=roll))
-    assert float(found) == pytest.approx(20.0 / below, rel=1e-9)
-
-
-def test_a_tilt_is_found_over_the_sea_with_an_honest_uncertainty() -> None:
-    azimuth = np.tile(np.arange(0.0, 360.0, 5.0), 2)
-    elevation = np.repeat([-3.0, -4.0], 72)
-    mounting = Mounting(pitch_deg=0.12, roll_deg=-0.07, elevation_offset_deg=0.05)
-    met = sea_range_m(azimuth, elevation, height_m=25.0, mounting=mounting, radius_m=7.3e6)
-    inside = []
-    for seed in range(30):
-        noisy = met + np.random.default_rng(seed).normal(0, 2.0, met.size)
-        level = level_from_sea(
-            azimuth, elevation, noisy, range_std_m=2.0, height_m=25.0, solve_offset=True, radius_m=7.3e6
-        )
-        inside += [
-            abs(level.pitch_deg - 0.12) < 2 * level.pitch_std_deg,
-            abs(level.roll_deg + 0.07) < 2 * level.roll_std_deg,
-            abs(level.elevation_offset_deg - 0.05) < 2 * level.elevation_offset_std_deg,
-        ]
-    assert np.mean(inside) > 0.88
-    assert level.pitch_std_deg < 0.005
-
-
-def test_one_bearing_over_the_sea_tells_no_tilt() -> None:
-    met = sea_range_m(np.full(20, 30.0), -3.0, height_m=25.0, mounting=Mounting())
-    with pytest.raises(InputError, match="do not determine the tilt"):
-        level_from_sea(np.full(20, 30.0), np.full(20, -3.0), met, height_m=25.0)
-
-
 def sighting(
     name: str,
     azimuth_deg: float,
@@ -347,6 +300,18 @@ def test_three_targets_in_a_line_are_refused_however_steep(elevation: float) -> 
     seen = [sighting(f"{number}", a, elevation, Mounting()) for number, a in enumerate((10.0, 10.5, 190.0))]
     with pytest.raises(InputError, match=r"do not determine .*(pitch|roll)"):
         fit_mounting(seen)
+
+
+def test_masts_alone_tell_the_heading_and_no_tilt() -> None:
+    """A mast has no elevation: three around the horizon leave the elevation offset and the tilt open."""
+    masts = [
+        sighting(f"{a}", a, 5.0, Mounting(azimuth_offset_deg=2.0))._replace(elevation_std_deg=np.nan)
+        for a in (0, 120, 240)
+    ]
+    assert set(undetermined(masts)) == {"elevation_offset_deg", "pitch_deg", "roll_deg"}
+    assert fit_mounting(masts, solve=("azimuth_offset_deg",)).mounting.azimuth_offset_deg == pytest.approx(
+        2.0
+    )
 
 
 def test_targets_that_half_contradict_the_other_half_are_refused() -> None:
