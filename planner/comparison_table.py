@@ -75,9 +75,7 @@ def verdicts(comparison: Comparison) -> list[str]:
         told.append(f"{head}; not in {apart}" if off else head)
     fewest = min((row.speed.pairs for row in comparison.rows if row.slope_beside is not None), default=0)
     if told and fewest < FEW_PERIODS:
-        told.append(
-            f"with as few as {fewest} periods the standard errors themselves are known to no better than a third"
-        )
+        told.append(f"with as few as {fewest} periods the standard errors themselves are rough")
     return told
 
 
