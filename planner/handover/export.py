@@ -166,7 +166,7 @@ def _add_places(folder: Path, package: Path) -> None:
         import pyogrio
 
         pyogrio.write_dataframe(
-            pyogrio.read_dataframe(found), package, layer="places", driver="GPKG", append=True
+            pyogrio.read_dataframe(found), package, layer="placement", driver="GPKG", append=True
         )
 
 

@@ -32,7 +32,7 @@ PERIOD_S = 600.0
 OF_PERIOD = (2.0, 10.0, 10.0)  # wavenumber times L up to which the box is summed, along the wind, left, up
 OF_SCAN = (14.0, 14.0, 14.0)
 LONGEST_M, SHORTEST_M = 6e5, 4.0  # of the integrals over the spectrum, 2 pi over the wavenumber
-DRAWN = 200_000  # waves of those integrals
+DRAWN = 100_000  # waves of those integrals
 CHUNK = 20_000
 
 Seen = Callable[[FloatArray], FloatArray]  # (wave, 3) by which a wave's three components count

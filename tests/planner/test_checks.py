@@ -71,7 +71,9 @@ def triple(elevation_deg: float) -> Changes:
         turn = math.radians(bearing_deg)
         east, north = 500000 + away * math.sin(turn), 6251000 + away * math.cos(turn)
         lidars.append({**LIDAR_A, "name": name, "position": [east, north, 10]})
-        stares.append({"name": name.lower(), "lidar": name, "target": "T", "type": "stare", "accumulation_s": 0.5})
+        stares.append(
+            {"name": name.lower(), "lidar": name, "target": "T", "type": "stare", "accumulation_s": 0.5}
+        )
     pairs = [{"name": "triple", "scans": ["a", "b", "c"], "target": "T"}]
     return {"lidars": lidars, "scans": stares, "pairs": pairs}
 

@@ -175,4 +175,4 @@ def test_the_command_places_on_a_terrain_and_writes_everything(tmp_path, capsys)
         above = sight.read(1)
     assert (above[:4] >= 0).all() and (above[-2:] < 0).all()  # north of the ridge the target is seen
     assert run(["export", str(tmp_path / "site.yaml"), "--as", "gpkg", "--out", str(out), "--quiet"]) == 0
-    assert "places" in pyogrio.list_layers(out / "plan.gpkg")[:, 0]
+    assert "placement" in pyogrio.list_layers(out / "plan.gpkg")[:, 0]
