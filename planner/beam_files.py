@@ -15,6 +15,7 @@ from planner.places import Places
 from planner.scan_jobs import ScanJob
 from reconstruct.averaging import expected_count
 from reconstruct.beam_means import BeamSums, add_beam_sums, along_beam_mps, beam_means
+from reconstruct.duck import write_parquet
 from reconstruct.filters import Step
 from reconstruct.two_beam_means import TwoBeamMeans, trusted_means
 
@@ -55,13 +56,8 @@ def write_beams(
 
 def _write(frame: "pd.DataFrame", path: Path) -> None:
     """A table as CSV, and as Parquet beside it."""
-    import duckdb
-
     frame.to_csv(path, index=False, float_format="%.5f", encoding="utf-8")
-    target = str(path.with_suffix(".parquet")).replace("'", "''")
-    with duckdb.connect() as connection:
-        connection.register("beams", frame)
-        connection.execute(f"COPY beams TO '{target}' (FORMAT parquet)")
+    write_parquet(frame, path.with_suffix(".parquet"))
 
 
 def two_beam_means_of(job: ScanJob, rules: TwoBeam, parts: Sequence[BeamSums]) -> TwoBeamMeans:

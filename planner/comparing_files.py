@@ -12,6 +12,7 @@ from planner.comparison_table import sentences, table_rows, verdicts
 from planner.output import output_folder
 from planner.scan_jobs import scan_of
 from planner.wind_profile import wind_profile
+from reconstruct.duck import write_parquet
 
 if TYPE_CHECKING:
     from geometry.arrays import FloatArray
@@ -52,16 +53,12 @@ def write_comparison(
     list of Path
         What was written.
     """
-    import duckdb
     import pandas as pd
 
     with output_folder(folder) as staging:
         frame = pd.DataFrame(table_rows(comparison))
         frame.to_csv(staging / "comparison.csv", index=False, float_format="%.6g", encoding="utf-8")
-        with duckdb.connect() as connection:
-            connection.register("comparison", frame)
-            target = str(staging / "comparison.parquet").replace("'", "''")
-            connection.execute(f"COPY comparison TO '{target}' (FORMAT parquet)")
+        write_parquet(frame, staging / "comparison.parquet")
         (staging / "compare.log").write_text(_log(comparison, title), encoding="utf-8")
         for name, picture in _figures(comparison, title, kinds, every_size=every_size):
             (staging / name).write_bytes(picture)

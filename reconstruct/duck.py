@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import duckdb
+    import pandas as pd
 
 #: Of the pages, sorts and row groups that DuckDB holds; by itself it takes 80 % of the machine's memory.
 MEMORY = "128MB"
@@ -58,6 +59,21 @@ def bounded_duck(
         yield connection
     finally:
         connection.close()
+
+
+def write_parquet(frame: "pd.DataFrame", path: Path) -> None:
+    """Write a table as Parquet.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        One row a record.
+    path : Path
+        The file; one that is there is replaced.
+    """
+    with bounded_duck(spill=path.parent) as connection:
+        connection.register("frame", frame)
+        connection.execute(f"COPY frame TO {quoted(path)} (FORMAT parquet)")
 
 
 def quoted(path: Path | str) -> str:

@@ -41,8 +41,8 @@ from reconstruct.wind import WindState, uv_mps
 
 Progress = Callable[[float], None]
 
-# Of the samples at the target: in a second small eddies pass, which a mean of samples so far apart takes for slow
-# ones (8 % of the scatter of dual Doppler over ten minutes; 2 % at half a second).
+# Of the samples at the target: eddies that pass between two samples would be taken for slow ones (with one sample a
+# second the scatter of dual Doppler over ten minutes came out 5 % larger in the same fields).
 REFERENCE_INTERVAL_S = 0.5
 _CHUNK_RAYS = 1 << 16
 _BLOCKS = 20  # of realisations without turbulence, which share nothing
