@@ -122,6 +122,33 @@ def standing_head_m(heights: Heights, lidar: Lidar) -> FloatArray:
     return np.array([east, north, max(height, ground) if np.isfinite(ground) else height])
 
 
+def beam_ends_m(
+    places: Places, lidar: Lidar, azimuth_deg: ArrayLike, elevation_deg: ArrayLike, range_m: ArrayLike
+) -> FloatArray:
+    """Where beams come to at a range, which refraction bends down: by 0.4 m at 6 km.
+
+    Parameters
+    ----------
+    places, lidar
+        Where the lidar stands.
+    azimuth_deg, elevation_deg
+        (...,) true angles at the head [deg].
+    range_m
+        (...,) from the head [m]; broadcasts against the angles.
+
+    Returns
+    -------
+    FloatArray
+        (..., 3) easting, northing and height [m].
+    """
+    range_ = np.asarray(range_m, dtype=np.float64)
+    ends = places.frame.projected_m(
+        lidar.position, range_[..., None] * unit_vector(azimuth_deg, elevation_deg)
+    )
+    ends[..., 2] -= refraction_lift_m(range_)
+    return np.asarray(ends)
+
+
 def _of_scan(places: Places, layout: ScanLayout, heights: Heights) -> OverTerrain:
     wanted = reach_m(layout)
     gates = np.empty(0) if layout.gates is None or _alone(layout) else layout.gates.centres_m
@@ -163,12 +190,8 @@ def _ends_m(places: Places, layout: ScanLayout, reach: FloatArray, cell_m: float
     count = min(int(np.ceil(np.radians(swept) * reach.max() / cell_m)) + 1, MOST_IN_FAN)
     turn = np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1)
     lowest = scan.elevation_deg - np.abs(scan.swept_elevation_deg) / 2
-    beams = unit_vector(
-        scan.azimuth_deg[:, None] + turn * scan.swept_azimuth_deg[:, None], lowest[:, None] + 0.0 * turn
-    )
-    ends = places.frame.projected_m(layout.lidar.position, reach[:, None, None] * beams)
-    ends[..., 2] -= refraction_lift_m(reach)[:, None]
-    return np.asarray(ends)
+    azimuth = scan.azimuth_deg[:, None] + turn * scan.swept_azimuth_deg[:, None]
+    return beam_ends_m(places, layout.lidar, azimuth, lowest[:, None] + 0.0 * turn, reach[:, None])
 
 
 def _least(sight: TerrainSight) -> FloatArray:

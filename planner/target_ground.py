@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import ArrayLike, FloatArray
-from geometry.beams import unit_vector
+from geometry.arrays import FloatArray
 from geometry.terrain_sight import terrain_sight
 from planner.ground import heights_of
 from planner.obstruction import ground_met_m
-from planner.over_terrain import standing_head_m
+from planner.over_terrain import beam_ends_m, standing_head_m
 from planner.places import Places
 from planner.site import Lidar
 
@@ -51,17 +50,10 @@ def ground_met(
         above_m = max(lidar.position[2] - places.site.ground_m, 0.0)
         met = ground_met_m(above_m, elevation) < reach_m
     else:
-        ends = _ends_m(places, lidar, azimuth, elevation, reach_m)
+        ends = beam_ends_m(places, lidar, azimuth, elevation, reach_m)
         sight = terrain_sight(heights.top, standing_head_m(heights, lidar), ends)
         met, unknown = sight.blocked[..., -1], bool(sight.unknown[..., -1].any())
     if not met.any() and not unknown:
         return None
     highest = float(head_elevation[met].max()) if met.any() else float("nan")
     return GroundMet(float(met.mean()), highest, unknown)
-
-
-def _ends_m(
-    places: Places, lidar: Lidar, azimuth_deg: ArrayLike, elevation_deg: ArrayLike, reach_m: float
-) -> FloatArray:
-    """(ray, 3) easting, northing and height of the rays' ends [m]."""
-    return places.frame.projected_m(lidar.position, reach_m * unit_vector(azimuth_deg, elevation_deg))

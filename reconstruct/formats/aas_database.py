@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError
 from reconstruct.formats.aas_tables import (
     CHUNK_ROWS,
@@ -24,7 +24,7 @@ from reconstruct.formats.over_the_top import folded
 from reconstruct.formats.text import seconds_delta, utc_from_labview
 from reconstruct.formats.time_order import time_order
 from reconstruct.formats.wind_lines import EARLIEST_S, LATEST_S, LONGEST_RAY_S
-from reconstruct.losses import Loss, merged_losses
+from reconstruct.losses import Loss, losses_text, merged_losses
 from reconstruct.records import Records, join
 from reconstruct.sweep_ids import sweep_ids
 from reconstruct.sweep_lag import estimate_lead, evened, without_lead
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 #: Rays that are fetched at once: with 41 gates some 800,000 rows.
 CHUNK_RAYS = 20_000
+
+#: What a gate has.
+QUANTITIES = ("radSpeed", "cnr", "disp")
 
 #: Measurements that show where the gates are, and how near to one is on it [decametre].
 LOOKED_AT, SAME_GATE = 2_000, 0.005
@@ -112,10 +115,48 @@ def aas_chunks(
             options.instrument
             or str(connection.engine.url.database or "").rpartition("/")[2].partition(".")[0]
         )
-        for scenario in scenario_numbers(connection, held, options.scenario):
-            attitude = _attitude(connection, held, scenario)
-            fetched = _fetched(connection, held, scenario, rays, options, attitude, name, range_m)
-            yield from _whole_sweeps(fetched, rays)
+
+        def every() -> Iterator[Records]:
+            for scenario in scenario_numbers(connection, held, options.scenario):
+                attitude = _attitude(connection, held, scenario)
+                fetched = _fetched(connection, held, scenario, rays, options, attitude, name, range_m)
+                yield from _whole_sweeps(fetched, rays)
+
+        yield from _with_rays(every(), _nameless_values(connection, held["measurement"]))
+
+
+def _with_rays(parts: Iterator[Records], untold: list[Loss]) -> Iterator[Records]:
+    """The parts that have rays; what the others lost is told with the next of them, or with the last.
+
+    Raises
+    ------
+    InputError
+        If something was lost and there is no part to tell it with.
+    """
+    held: Records | None = None
+    for part in parts:
+        if not part.rays:
+            untold = [*untold, *part.losses]
+            continue
+        if held is not None:
+            yield held
+        held, untold = replace(part, losses=merged_losses([*untold, *part.losses])), []
+    if held is not None:
+        yield replace(held, losses=merged_losses([*held.losses, *untold]))
+    elif untold:
+        raise InputError(f"the database holds no ray that can be used:\n{losses_text(merged_losses(untold))}")
+
+
+def _nameless_values(connection: "sa.Connection", columns: dict[str, str]) -> list[Loss]:
+    """Values that belong to no ray, in any scenario."""
+    import sqlalchemy as sa
+
+    clause, _ = select("measurement", columns)
+    key = clause.c[columns["gw_id"]]
+    count = int(
+        connection.execute(sa.select(sa.func.count()).select_from(clause).where(key.is_(None))).scalar_one()
+    )
+    return [Loss("measurement", "a value without a gw_id", times=count)] if count else []
 
 
 def _attitude(
@@ -147,7 +188,7 @@ def _fetched(
     name: str,
     range_m: float | None,
 ) -> Iterator[Records]:
-    """Rays of a scenario as they are fetched, some at a time."""
+    """Rays of a scenario as they are fetched, some at a time; of a page without a usable ray only what was lost."""
     control, ray_query = select("control", held["control"])
     values, value_query = select("measurement", held["measurement"])
     key, other = control.c[held["control"]["gw_id"]], values.c[held["measurement"]["gw_id"]]
@@ -170,10 +211,9 @@ def _fetched(
             within = within.where(distance >= gate - SAME_GATE).where(distance <= gate + SAME_GATE)
         measured = _frame(connection, within, held["measurement"])
         records = _records(found, measured[measured["gw_id"].isin(found["gw_id"])], attitude, options)
-        if records.rays:
-            losses = merged_losses([*records.losses, *untold])
-            untold = []
-            yield replace(records, instrument=name, losses=losses).mounted(options.mounting)
+        losses = merged_losses([*records.losses, *untold])
+        untold = []
+        yield replace(records, instrument=name, losses=losses).mounted(options.mounting)
 
 
 def _nearest_gate(
@@ -189,13 +229,30 @@ def _nearest_gate(
 def _frame(
     connection: "sa.Connection", query: "sa.Select[tuple[object, ...]]", columns: dict[str, str]
 ) -> pd.DataFrame:
-    """Rows of a query as numbers; a NULL, a text that is no number and a value without end are NaN."""
+    """Rows of a query as numbers; a NULL, a text that is no number and a value without end are NaN.
+
+    `_wrong` counts in each row those of the gate's quantities that came and are no number.
+    """
     streamed = connection.execution_options(stream_results=True, yield_per=CHUNK_ROWS).execute(query)
-    parts = [[_numbers(column) for column in zip(*rows, strict=True)] for rows in streamed.partitions()]
-    names = list(columns)
-    if not parts:
-        return pd.DataFrame({name: np.empty(0) for name in names})
-    return pd.DataFrame({name: np.concatenate([part[i] for part in parts]) for i, name in enumerate(names)})
+    names, parts = list(columns), []
+    for rows in streamed.partitions():
+        came = dict(zip(names, zip(*rows, strict=True), strict=True))
+        numbers = {name: _numbers(column) for name, column in came.items()}
+        wrong = [_no_number(came[name], numbers[name]) for name in QUANTITIES if name in came]
+        parts.append(pd.DataFrame({**numbers, "_wrong": np.sum(wrong, axis=0) if wrong else 0}))
+    return (
+        pd.concat(parts, ignore_index=True)
+        if parts
+        else pd.DataFrame(columns=[*names, "_wrong"], dtype=float)
+    )
+
+
+def _no_number(column: Sequence[object], numbers: FloatArray) -> IntArray:
+    """(row,) 1 where something came that is no number, a NULL being nothing."""
+    out = np.zeros(len(numbers), dtype=np.intp)
+    missing = np.flatnonzero(np.isnan(numbers)).tolist()
+    out[missing] = [column[row] is not None for row in missing]
+    return out
 
 
 def _numbers(column: Sequence[object]) -> FloatArray:
@@ -220,6 +277,7 @@ def _usable(control: pd.DataFrame, measured: pd.DataFrame) -> tuple[pd.DataFrame
         ("control", "a ray without time, angles or measurement", int((~sound).sum())),
         ("control", "a ray with the gw_id of one before", int((sound & ~first).sum())),
         ("measurement", "a value without a distance", int((~ranged).sum())),
+        ("measurement", "a speed, CNR or width that is no number", int(measured["_wrong"].sum())),
     )
     losses = [Loss(table, text, times=times) for table, text, times in rules if times]
     control, measured = control[sound & first], measured[ranged]
@@ -236,7 +294,7 @@ def _records(
 ) -> Records:
     """Rays in our convention."""
     control, measured, losses = _usable(control, measured)
-    grid = gate_table(measured, ray=["gw_id"], gate="dist", values=("radSpeed", "cnr", "disp"))
+    grid = gate_table(measured, ray=["gw_id"], gate="dist", values=QUANTITIES)
     if grid.doubles:
         losses.append(Loss("measurement", "a gw_id and distance that come twice", times=grid.doubles))
     place = np.searchsorted(grid.first["gw_id"].to_numpy(dtype=float), control["gw_id"].to_numpy(dtype=float))
@@ -271,6 +329,9 @@ def _whole_sweeps(parts: Iterator[Records], rays: int) -> Iterator[Records]:
     rest: Records | None = None
     number = 0
     for part in parts:
+        if not part.rays:
+            yield part
+            continue
         every = part if rest is None else _end_to_end(rest, part)
         every = replace(every, sweep_id=sweep_ids(every.azimuth_deg, every.elevation_deg) + number)
         number = int(every.sweep_id[-1])

@@ -51,6 +51,9 @@ if TYPE_CHECKING:
 #: A file is filled up to a multiple of four bytes: so many more than its numbers need are no damage.
 PADDING = 3
 
+#: First bytes of files that gzip has packed, and of netCDF-4.
+GZIP, HDF5 = b"\x1f\x8b", b"\x89HDF"
+
 
 def read_cfradial(path: Path, options: Options | None = None) -> Records:
     """Rays of a netCDF file of a Doppler lidar.
@@ -131,6 +134,17 @@ def _datasets(path: Path) -> "list[tuple[xr.Dataset, dict[str, Any]]]":
 
 def _whole(path: Path) -> None:
     """Refuse a file that is cut off or shifted where the library would read zeros and other numbers."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(4)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error})") from error
+    if start[:2] == GZIP:
+        raise InputError(
+            f"{path}: is netCDF packed with gzip, which its library cannot open: unpack it first (gunzip)"
+        )
+    if start == HDF5:
+        return
     raw = read_bytes(path)
     missing = missing_bytes(raw) if raw[:3] == b"CDF" else 0
     if missing is not None and not -PADDING <= missing <= 0:

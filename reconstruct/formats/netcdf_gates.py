@@ -48,8 +48,8 @@ UNITS = {"m": _METRES, "m/s": _SPEEDS, "degrees": _DEGREES, "s": _SECONDS}
 #: A ratio of powers, not its logarithm, has one of these for its units.
 LINEAR = ("1", "ratio", "linear", "unitless", "dimensionless", "none", "-")
 
-#: Where a file says in words that a positive speed comes nearer.
-_TOWARD = re.compile(r"positive[^.;]*\btoward|toward[^.;]*\bpositive")
+#: A sign and a way, by which a file says in words what its speeds mean.
+_SIGN, _WAY = re.compile(r"\b(positive|negative)"), re.compile(r"\b(toward|away)")
 
 
 class Gates(NamedTuple):
@@ -144,12 +144,28 @@ def _speed(data: "xr.Dataset", rays: int, ranges: FloatArray, path: Path, notes:
     notes += said
     attributes = data[name].attrs
     words = " ".join(str(attributes.get(key, "")) for key in ("long_name", "comment", "comments")).lower()
-    stated = f"{attributes.get('standard_name', '')} {attributes.get('positive', '')}"
+    stated = f"{attributes.get('standard_name', '')} {attributes.get('positive', '')}".lower()
     speed = _placed(speed, data, str(name), ranges, rays, path)
-    if "toward" not in stated and _TOWARD.search(words) is None:
+    if "away" in stated or ("toward" not in stated and not positive_toward(words)):
         return speed
     notes.append("radial speeds turned from positive toward to positive away")
     return -speed
+
+
+def positive_toward(words: str) -> bool:
+    """Whether a text says that a positive speed comes nearer: the first part of a sentence, else the first sentence,
+    that has both a sign and a way decides.
+
+    Examples
+    --------
+    >>> positive_toward("positive values are towards the lidar."), positive_toward("positive away, negative toward")
+    (True, False)
+    """
+    for part in (*re.split("[.;,]", words), *re.split("[.;]", words)):
+        sign, way = _SIGN.search(part), _WAY.search(part)
+        if sign is not None and way is not None:
+            return (sign[1] == "positive") == (way[1] == "toward")
+    return False
 
 
 def _cnr(data: "xr.Dataset", rays: int, ranges: FloatArray, path: Path, notes: list[str]) -> FloatArray:

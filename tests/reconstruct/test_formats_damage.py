@@ -294,8 +294,10 @@ DATABASE = {
     "no distance": ("UPDATE measurement SET dist = NULL WHERE rowid = 7", 12, 1),
     "behind the lidar": ("UPDATE measurement SET dist = -5 WHERE rowid = 7", 12, 1),
     "no measurement": ("DELETE FROM measurement WHERE gw_id = (SELECT gw_id FROM control LIMIT 1)", 11, 1),
-    "a text for a speed": ("UPDATE measurement SET radSpeed = 'abc' WHERE rowid = 7", 12, 0),
-    "an endless speed": ("UPDATE measurement SET radSpeed = 9e999 WHERE rowid = 7", 12, 0),
+    "a text for a speed": ("UPDATE measurement SET radSpeed = 'abc' WHERE rowid = 7", 12, 1),
+    "a value without gw_id": ("UPDATE measurement SET gw_id = NULL WHERE rowid = 7", 12, 1),
+    "an endless speed": ("UPDATE measurement SET radSpeed = 9e999 WHERE rowid = 7", 12, 1),
+    "no speed": ("UPDATE measurement SET radSpeed = NULL WHERE rowid = 7", 12, 0),
     "a text in the log": ("UPDATE system SET pitch = 'x' WHERE rowid = 2", 12, 0),
 }
 
@@ -320,3 +322,28 @@ def test_a_damaged_row_of_the_database_costs_no_other(tmp_path, statement, rays,
     }
     for time, speeds in zip(records.time_utc.astype("int64") // 1000, records.radial_speed_mps, strict=True):
         assert np.all((speeds == by_time[int(time)]) | np.isnan(speeds))
+
+
+def test_a_database_without_a_usable_ray_says_what_it_lost(tmp_path):
+    pytest.importorskip("sqlalchemy", reason="the extra 'db' is not installed")
+    (tmp_path / "a_wind.txt").write_text(WIND, encoding="utf-8")
+    place = tmp_path / "study.sqlite"
+    write_aas(read(tmp_path / "a_wind.txt", options=KINDS["a_wind.txt"][1]), place)
+    with sqlite3.connect(place) as connection:
+        connection.execute("UPDATE control SET azim = NULL")
+    connection.close()
+    with pytest.raises(InputError, match=r"a ray without time, angles or measurement \(12 times\)"):
+        read(place)
+
+
+def test_rays_lost_in_a_scenario_of_their_own_are_counted_with_the_others(tmp_path):
+    pytest.importorskip("sqlalchemy", reason="the extra 'db' is not installed")
+    (tmp_path / "a_wind.txt").write_text(WIND, encoding="utf-8")
+    place = tmp_path / "study.sqlite"
+    write_aas(read(tmp_path / "a_wind.txt", options=KINDS["a_wind.txt"][1]), place)
+    with sqlite3.connect(place) as connection:
+        connection.execute("UPDATE control SET scn_id = 1000000, azim = NULL WHERE rowid > 7")
+    connection.close()
+    records = read(place)
+    assert records.rays == 7
+    assert sum(loss.times for loss in records.losses) == 5

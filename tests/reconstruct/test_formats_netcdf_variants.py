@@ -8,6 +8,7 @@ header of an ARM dlppi file; [N] github.com/StefanoWind/FIEXTA, lidargo's
 format.py, which makes the netCDF of the Wind Data Hub.
 """
 
+import gzip
 import random
 
 import numpy as np
@@ -201,6 +202,19 @@ SIGNS = {
     "words": ({"comment": "Positive values are towards the lidar."}, -1),
     "attribute": ({"positive": "toward"}, -1),
     "away in words [K]": ({"comments": "where positive implies movement away from the instrument"}, 1),
+    "both ways": ({"comment": "Positive away from the lidar, negative toward it"}, 1),
+    "both ways, the negative first": (
+        {"comments": "a negative value is movement towards the lidar, and a positive value away from it"},
+        1,
+    ),
+    "only the negative": ({"long_name": "radial velocity (negative is away)"}, -1),
+    "name against words": (
+        {
+            "standard_name": "radial_velocity_of_scatterers_away_from_instrument",
+            "comment": "turned from positive toward",
+        },
+        1,
+    ),
     "nothing": ({}, 1),
 }
 
@@ -304,3 +318,10 @@ def test_no_mutation_of_a_classic_file_brings_the_reader_to_anything_but_an_inpu
             assert str(path) in str(error)
         else:
             assert records.rays + sum(loss.times for loss in records.losses) >= RAYS
+
+
+def test_a_packed_netcdf_is_told_to_be_one(tmp_path):
+    packed = tmp_path / "a.nc.gz"
+    packed.write_bytes(gzip.compress(flat(tmp_path / "a.nc").read_bytes()))
+    with pytest.raises(InputError, match=r"packed with gzip.*unpack it first"):
+        read(packed)

@@ -41,13 +41,19 @@ def rows():
     ]
 
 
+def distance(row):
+    """In standard errors: that of a scatter is proportional to it, so a low one by chance looks too sure of itself."""
+    scatter = row.name.startswith("var") or "std" in row.name
+    return row.errors * min(1.0, row.judge / row.tier) if scatter else row.errors
+
+
 def test_tier_is_within_three_standard_errors_or_two_per_cent_of_the_judge_on_twelve_scenes(rows):
     """Of 96 numbers 0.6 are expected outside by chance alone: with 24 fields the distance in standard errors is
     a Student t of 23 degrees of freedom. Three or more outside (2 %), or one beyond 5, would be no chance."""
     assert len({row.scene for row in rows}) == 12
     outside = [row for row in rows if not row.agrees]
     assert len(outside) < 3, outside
-    assert all(abs(row.errors) < 5 for row in outside), outside
+    assert all(abs(distance(row)) < 5 for row in outside), outside
 
 
 def test_standard_errors_of_the_judge_are_those_of_its_distance_to_the_tier(rows):
