@@ -6,14 +6,12 @@ outside the raster, or in a hole of it, is unknown; sea level is a height, 0 m, 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from geometry.arrays import ArrayLike, BoolArray, FloatArray
 from geometry.errors import InputError
-
-HeightDatum = Literal["above_sea_level", "ellipsoidal"]
+from geometry.frames import HeightDatum
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,9 +43,10 @@ from planner.sum_files import Key, SumFiles
 from reconstruct.attitude import LogMeans
 from reconstruct.automatic_filter import Agreement
 from reconstruct.filters import Step
+from reconstruct.losses import Loss, merged_losses
 from reconstruct.records import Records, join
 
-VERSION = 3  # of what is kept of a part; another one is worked on anew
+VERSION = 4  # of what is kept of a part; another one is worked on anew
 WORK = ".parts"
 STAGING = "results"
 
@@ -226,10 +227,16 @@ class _Merged:
         self.lost: dict[str, int] = {}
         self.resumed = 0  # parts that an earlier run had done
         self.agreement = Agreement(0, 0, 0, 0)
-        self.notes: tuple[str, ...] = ()
+        self._notes: tuple[str, ...] = ()
+        self._losses: tuple[Loss, ...] = ()
         self.offset_deg = 0.0
         self._logs: list[LogMeans] = []
         self._unlogged = 0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What there is to say of the parts, each once, and what was lost of all of them together."""
+        return (*self._notes, *(f"lost: {loss}" for loss in self._losses))
 
     @property
     def logged(self) -> Logged | None:
@@ -244,7 +251,8 @@ class _Merged:
             self.lost[reason] = self.lost.get(reason, 0) + count
         both = zip(self.agreement, kept.part.agreement, strict=True)
         self.agreement = Agreement(*(one + other for one, other in both))
-        self.notes = tuple(dict.fromkeys((*self.notes, *kept.notes)))
+        self._notes = tuple(dict.fromkeys((*self._notes, *kept.notes)))
+        self._losses = merged_losses([*self._losses, *kept.losses])
         self.offset_deg = max(self.offset_deg, kept.part.offset_deg, key=abs)
         self._logs += [] if kept.log is None else [kept.log]
         self._unlogged += kept.unlogged
@@ -293,11 +301,12 @@ def _work(
     *,
     last: bool,
 ) -> Kept:
-    found, notes = _loaded(part, known, item, job, plan)
+    found, notes, losses = _loaded(part, known, item, job, plan)
     records = None if found is None else found.records
     if pending is not None:
         records = pending if records is None else join([pending, records])
-    told = (notes, known, None, 0) if found is None else (notes, found.known, found.log, found.unlogged)
+    shown = (known, None, 0) if found is None else (found.known, found.log, found.unlogged)
+    told = (notes, losses, *shown)
     if records is None or not records.rays:
         return Kept(empty_part(), None, *told)
     later: Records | None = None
@@ -312,16 +321,16 @@ def _work(
 
 def _loaded(
     part: Part, known: Known, item: RayInput, job: ScanJob, plan: Plan
-) -> tuple[Pointed | None, tuple[str, ...]]:
-    """The rays of a part at the gate, and what there is to say of them; a bad file among others is a note."""
+) -> tuple[Pointed | None, tuple[str, ...], tuple[Loss, ...]]:
+    """The rays of a part at the gate, what there is to say of them, and what was lost; a bad file among others is a note."""
     try:
         found = pointed(part.load(), item, job.layout, plan.places, known)
     except InputError as error:
         if part.alone:
             raise
-        return None, (f"lost: {error}",)
+        return None, (f"lost: {error}",), ()
     records = gate_of(found.records, job.layout, job.range_m)
-    return found._replace(records=records), (*records.notes, *(f"lost: {loss}" for loss in records.losses))
+    return found._replace(records=records), records.notes, records.losses
 
 
 def _tell(progress: Progress | None, share: float) -> None:

@@ -10,13 +10,12 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from planner.campaign_logs import Attitude, SonicInput, TimeLag
-from planner.nouns import Count, Name, NonNegative, Noun, Number, Positive, Share, name_of_true
+from planner.nouns import Bearing, Count, Name, NonNegative, Noun, Number, Positive, Share, name_of_true
 
 Kind = Literal[
     "auto", "csv", "parquet", "store", "windscanner", "cfradial", "hpl", "nacelle", "database"
 ]  # auto: what the file's first bytes say
 Limit = Annotated[float, Field(strict=True)] | None
-Bearing = Annotated[float, Field(strict=True, ge=0, le=360)]
 Size = Annotated[float, Field(strict=True, gt=0, le=360)]
 STUDY_AVAILABILITY = 0.38  # 19 of 50 scans in ten minutes
 CNR_DB = (-25.0, -5.0)  # a usual range of the device

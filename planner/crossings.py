@@ -9,13 +9,10 @@ from geometry.arrays import FloatArray
 from geometry.crossing import cross, shared_probe_length_m
 from planner.places import Places
 from planner.ray_sets import pair_rays
-from planner.scan_layout import ScanLayout
+from planner.scan_layout import NO_TARGET_REACH_M, ScanLayout
 from planner.site import Pair
 from reconstruct.ray_fit import ray_rows
 from reconstruct.retrieval import cofactor, condition
-
-# How far along a beam its direction in the site's frame is taken where it does not look at the target.
-NO_TARGET_REACH_M = 1000.0
 
 
 class PairCrossing(NamedTuple):

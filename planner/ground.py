@@ -8,7 +8,8 @@ import numpy as np
 
 from geometry.arrays import ArrayLike, FloatArray
 from geometry.errors import InputError
-from geometry.terrain import HeightDatum, HeightRaster
+from geometry.frames import HeightDatum
+from geometry.terrain import HeightRaster
 from planner.site import Site, Terrain
 
 Stamps = tuple[int, ...]  # when the files were last written: a raster that has changed is read again

@@ -17,6 +17,7 @@ from reconstruct.automatic_filter import Agreement
 from reconstruct.averaging import PeriodSums
 from reconstruct.beam_means import BeamSums
 from reconstruct.filters import Step
+from reconstruct.losses import Loss
 from reconstruct.pairing import RaySeries
 from reconstruct.records import Records
 
@@ -29,6 +30,7 @@ class Kept(NamedTuple):
     part: ScanPart
     pending: Records | None  # the last pass, which the next part may go on with
     notes: tuple[str, ...]
+    losses: tuple[Loss, ...] = ()  # what of the part could not be read
     known: Known = NOTHING_KNOWN  # of the instrument, for the next part
     log: LogMeans | None = None  # of the attitude
     unlogged: int = 0  # rays without an attitude while others have one
@@ -50,6 +52,7 @@ def write_kept(place: Path, mark: str, kept: Kept) -> None:
     head = {
         "mark": mark,
         "notes": kept.notes,
+        "losses": kept.losses,
         "steps": [list(step) for step in part.steps],
         "agreement": list(part.agreement),
         "offset_deg": part.offset_deg,
@@ -110,6 +113,7 @@ def read_kept(place: Path, mark: str) -> Kept | None:
         part,
         pending,
         tuple(head["notes"]),
+        tuple(Loss(*loss) for loss in head["losses"]),
         Known(*(None if each is None else tuple(each) for each in head["known"])),
         LogMeans(**logged) if logged else None,
         head["unlogged"],

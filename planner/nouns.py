@@ -15,6 +15,7 @@ Number = Annotated[float, Field(strict=True)]
 Positive = Annotated[float, Field(strict=True, gt=0)]
 NonNegative = Annotated[float, Field(strict=True, ge=0)]
 Share = Annotated[float, Field(strict=True, ge=0, le=1)]
+Bearing = Annotated[float, Field(strict=True, ge=0, le=360)]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Position = tuple[Number, Number, Number]  # easting, northing, height [m]
 Name = Annotated[

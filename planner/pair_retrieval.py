@@ -55,7 +55,7 @@ def retrieve_pair(
                 shift_s=campaign.averaging.time_shift_s,
             )
             sums.add(Key(pair.pair, float("nan"), period_s), part)
-        found = compare_gaps(*series, gaps_s=asked)
+        found = compare_gaps(*series, gaps_s=asked, columns=declared.fit_columns)
         compared = tuple(one + more for one, more in zip(compared, found, strict=True)) if compared else found
     return compared
 

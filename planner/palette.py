@@ -33,6 +33,8 @@ LABEL_PX = 17
 LEGEND_PX = 15
 NOTE_PX = 13
 
+WAKE_DIAMETERS = 8  # how much of a wake is drawn, in rotor diameters; a wake goes on
+
 
 def lidar_colour(index: int) -> str:
     """Give the colour of the lidar with this index in the site file; after the sixth they repeat.

@@ -13,7 +13,7 @@ from geometry.errors import InputError
 from planner.crossings import PairCrossing, beam_line
 from planner.ground import heights_of
 from planner.obstruction import lost_ranges_m, reach_m
-from planner.palette import EXCLUDED, OBSTACLE, lidar_colour
+from planner.palette import EXCLUDED, OBSTACLE, WAKE_DIAMETERS, lidar_colour
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
 from planner.scan_plans import PointsScan, RasterScan
@@ -23,7 +23,6 @@ from planner.scene.structures import obstacle
 
 UP = np.array([0.0, 0.0, 1.0])
 GROUND_M = 0.0  # the site's local frame has its origin at ground level
-WAKE_DIAMETERS = 8  # how much of a wake is drawn; a wake goes on
 RING_SHARE = (0.8, 1.0)  # inner and outer radius of the excluded directions, of `ring_m`
 RING_OF_RANGE = 0.2  # outer radius, as a share of the range to the target
 CLOSE_UP_M = 150.0  # half of what is seen around the first target

@@ -24,6 +24,9 @@ DEFAULT_FFT_POINTS = 64
 # A beam to a target nearer than this has no direction worth the name.
 LEAST_RANGE_M = 1.0
 
+# How far a scan without gates and target is taken to look.
+NO_TARGET_REACH_M = 1000.0
+
 
 @dataclass(frozen=True)
 class ScanLayout:
@@ -85,6 +88,12 @@ class ScanLayout:
         """Range of the farthest target or gate [m]; 0 where there is neither."""
         last_m = self.gates.last_m if self.gates else 0.0
         return max([last_m, *(float(value) for value in self.aim.range_m)])
+
+    @property
+    def drawn_reach_m(self) -> float:
+        """How far the scan is drawn: to the measured gate of its farthest target, else to its last gate [m]."""
+        ranges = [self.measured_range_m(float(value)) for value in self.aim.range_m]
+        return max(ranges, default=self.gates.last_m if self.gates else NO_TARGET_REACH_M)
 
     @property
     def unambiguous_range_m(self) -> float | None:

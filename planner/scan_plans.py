@@ -4,10 +4,9 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
+from geometry.sweeps import Motion, Sweep
 from planner.nouns import Count, Name, Noun, Positive
 
-Motion = Literal["continuous", "step"]
-Sweep = Literal["back_and_forth", "forward", "reset"]
 Return = Literal["back_and_forth", "reset"]  # what cannot go round on
 ScanType = Literal["sector", "ppi", "rhi", "stare", "raster", "points"]
 

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo,
 
 from geometry.errors import InputError
 from planner.instruments import Instrument, Pulse
-from planner.nouns import Name, NonNegative, Noun, Number, Positive
+from planner.nouns import Bearing, Name, NonNegative, Noun, Number, Positive
 from planner.scan_plans import (
     GatePlan,
     PointsScan,
@@ -124,9 +124,6 @@ class Turbulence(Noun):
     """Longitudinal integral length scale; the Kaimal length of IEC 61400-1 is 2.33 times as long. E.g. 170"""
     model: Literal["von-karman"] = "von-karman"
     """Spectral model of the turbulence. E.g. von-karman"""
-
-
-Bearing = Annotated[float, Field(strict=True, ge=0, le=360)]
 
 
 class Wind(Noun):

@@ -1,9 +1,9 @@
 """What a whole campaign of sector scans would show: every state of its climate, all errors, and the
 regression.
 
-Errors that stay for the campaign (heading, levelling, position, calibration) do not scatter its points. They
-tilt and shift the line through them, by an amount that is known in size only: `slope_std` and
-`direction_offset_std_deg`.
+Errors that stay for the campaign (heading, levelling, position, calibration) tilt and shift the line through
+its points, by an amount that is known in size only: `slope_std` and `direction_offset_std_deg`. What they do to
+the wind depends on its direction, so that they also scatter the points about that line.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,13 @@ from reconstruct.periods import TEN_MINUTES_S
 from reconstruct.persistence import random_variance
 from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
-from reconstruct.regression import DirectionRegression, SpeedRegression, regress_direction, regress_speed
+from reconstruct.regression import (
+    DirectionRegression,
+    SpeedRegression,
+    regress_direction,
+    regress_speed,
+    unwrapped_deg,
+)
 from reconstruct.spectra import Turbulence
 from reconstruct.ten_minute import Reference, TenMinute, predict_ten_minutes
 from reconstruct.uncertainty import ErrorSources, mean_errors_mps, ray_errors
@@ -102,35 +108,62 @@ def predict_campaign(
         sweep=sweep,
         clock_s=clock_std_s(rays, sources),
     )
-    slope_std, offset_std = _persistent(rays, climate, states, means, fits, sources)
-    speed, direction = regress_speed(climate, means), regress_direction(climate, means)
-    return Campaign(means, speed, direction, slope_std, offset_std)
+    lasting = _lasting(rays, climate, states, means, fits, sources)
+    speed = regress_speed(climate, means, lasting_m2s2=lasting.residual_m2s2)
+    direction = regress_direction(climate, means, lasting_deg2=lasting.residual_deg2)
+    return Campaign(means, speed, direction, lasting.slope_std, lasting.offset_std_deg)
 
 
-def _persistent(
+class _Lasting(NamedTuple):
+    """What errors that stay for the campaign do to its regression; (...) is the axis of sector sizes."""
+
+    slope_std: FloatArray
+    offset_std_deg: FloatArray  # of the mean direction
+    residual_m2s2: FloatArray  # expected variance about the line through the origin
+    residual_deg2: FloatArray  # the same about the line of the directions
+
+
+def _lasting(
     rays: Rays,
     climate: Climate,
     states: list[WindState],
     means: list[TenMinute],
     fits: FloatArray,
     sources: ErrorSources | Sequence[ErrorSources] | None,
-) -> tuple[FloatArray, FloatArray]:
-    """Standard deviation of slope and mean direction over what the errors that stay may be, to first order.
+) -> _Lasting:
+    """Moments over what the errors that stay may be, to first order.
 
-    With a = E[mast · lidar]/E[lidar²] a change d of the lidar changes a by E[(mast - 2 a lidar) d]/E[lidar²].
+    With a = E[mast · lidar]/E[lidar²] a change d of the lidar changes a by δ = E[(mast - 2 a lidar) d]/E[lidar²],
+    and the residual by -(a d + δ lidar).
     """
     shape = fits.shape[:-2]
     if sources is None:
-        return np.zeros(shape), np.zeros(shape)
+        return _Lasting(*(np.zeros(shape) for _ in _Lasting._fields))
+    weight = climate.weight
     along, across = _shifts(rays, states, fits, sources)  # (state, draw, ...)
     slope = regress_speed(climate, means).slope
     lidar = np.stack([mean.lidar_mean_mps for mean in means])
     mast = np.stack([mean.reference_mean_mps for mean in means])
     variance = np.stack([mean.lidar_variance_m2s2 for mean in means])
-    square = np.tensordot(climate.weight, lidar**2 + variance, axes=1)
-    change = np.tensordot(climate.weight, (mast - 2 * slope * lidar)[:, None] * along, axes=1) / square
-    offset = np.tensordot(climate.weight, across, axes=1)
-    return np.sqrt(np.sum(change**2, axis=0)), np.sqrt(np.sum(offset**2, axis=0))
+    square = np.tensordot(weight, lidar**2 + variance, axes=1)
+    change = np.tensordot(weight, (mast - 2 * slope * lidar)[:, None] * along, axes=1) / square
+    left = slope * along + change * lidar[:, None]
+    offset = np.tensordot(weight, across, axes=1)
+    return _Lasting(
+        np.sqrt(np.sum(change**2, axis=0)),
+        np.sqrt(np.sum(offset**2, axis=0)),
+        np.sum(_variance_about_line(left, np.zeros(len(states)), weight), axis=0),
+        np.sum(_variance_about_line(across, unwrapped_deg(climate.from_deg, weight), weight), axis=0),
+    )
+
+
+def _variance_about_line(values: FloatArray, place: FloatArray, weight: FloatArray) -> FloatArray:
+    """Weighted variance (...) of values (state, ...) about a line over places (state,); about their mean if all are one."""
+    centred = values - np.tensordot(weight, values, axes=1)
+    away = place - weight @ place
+    spread, joint = weight @ away**2, np.tensordot(weight * away, centred, axes=1)
+    explained = joint**2 / spread if spread > 0 else 0.0
+    return np.asarray(np.tensordot(weight, centred**2, axes=1) - explained)
 
 
 def _shifts(

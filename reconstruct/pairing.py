@@ -209,17 +209,21 @@ class GapResult(NamedTuple):
         )
 
 
-def compare_gaps(*series: RaySeries, gaps_s: Sequence[float] = STUDY_GAPS_S) -> tuple[GapResult, ...]:
-    """Winds for several time gaps, as the study's Appendix F compares them.
+def compare_gaps(
+    *series: RaySeries, gaps_s: Sequence[float] = STUDY_GAPS_S, columns: Literal[2, 3] | None = None
+) -> tuple[GapResult, ...]:
+    """Winds for several time gaps, as the study's Appendix F compares them; `columns` as in `joint_wind`.
 
     A larger gap gives more pairs. Its winds scatter more, since the air has moved on between the rays of a pair.
     """
     rays = min(int(np.count_nonzero(np.isfinite(each.radial_speed_mps))) for each in series)
-    return tuple(_gap_result(series, gap_s, rays) for gap_s in gaps_s)
+    return tuple(_gap_result(series, gap_s, rays, columns) for gap_s in gaps_s)
 
 
-def _gap_result(series: Sequence[RaySeries], gap_s: float, rays: int) -> GapResult:
-    wind = joint_wind(series, gap_s=gap_s)
+def _gap_result(
+    series: Sequence[RaySeries], gap_s: float, rays: int, columns: Literal[2, 3] | None
+) -> GapResult:
+    wind = joint_wind(series, gap_s=gap_s, columns=columns)
     sums = period_sums(wind.time_utc, wind.fit.wind_mps[:, 0], wind.fit.wind_mps[:, 1])
     squares = float(np.sum(sums.square_m2s2 - np.square(sums.speed_mps) / np.maximum(sums.count, 1)))
     freedom = int(np.sum(sums.count - 1))

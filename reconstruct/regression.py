@@ -38,7 +38,9 @@ class DirectionRegression(NamedTuple):
     residual_std_deg: FloatArray
 
 
-def regress_speed(climate: Climate, means: list[TenMinute]) -> SpeedRegression:
+def regress_speed(
+    climate: Climate, means: list[TenMinute], *, lasting_m2s2: ArrayLike = 0.0
+) -> SpeedRegression:
     """Fit mast = slope · lidar over a climate.
 
     Parameters
@@ -47,6 +49,9 @@ def regress_speed(climate: Climate, means: list[TenMinute]) -> SpeedRegression:
         States and weights.
     means
         Ten-minute moments of each state, in the order of the climate.
+    lasting_m2s2
+        (...) What errors that stay for the campaign add to the variance of the residual [m²/s²]: see
+        `reconstruct.campaign`.
 
     Returns
     -------
@@ -70,7 +75,7 @@ def regress_speed(climate: Climate, means: list[TenMinute]) -> SpeedRegression:
     mast_square = _mean(weight, mast**2 + _stack(means, "reference_variance_m2s2"))
     product = _mean(weight, lidar * mast + _stack(means, "covariance_m2s2"))
     slope = product / lidar_square
-    residual_square = mast_square - slope * product
+    residual_square = mast_square - slope * product + np.asarray(lasting_m2s2)
     residual_mean = _mean(weight, mast) - slope * _mean(weight, lidar)
     mast_variance = mast_square - _mean(weight, mast) ** 2
     return SpeedRegression(
@@ -84,7 +89,9 @@ def regress_speed(climate: Climate, means: list[TenMinute]) -> SpeedRegression:
     )
 
 
-def regress_direction(climate: Climate, means: list[TenMinute]) -> DirectionRegression:
+def regress_direction(
+    climate: Climate, means: list[TenMinute], *, lasting_deg2: ArrayLike = 0.0
+) -> DirectionRegression:
     """Fit mast = slope · lidar + intercept to directions over a climate.
 
     Parameters
@@ -93,6 +100,8 @@ def regress_direction(climate: Climate, means: list[TenMinute]) -> DirectionRegr
         States and weights; directions are unwrapped to within 180 degrees of their weighted circular mean.
     means
         Ten-minute moments of each state, in the order of the climate.
+    lasting_deg2
+        (...) What errors that stay add to the variance of the residual [deg²].
 
     Returns
     -------
@@ -106,7 +115,7 @@ def regress_direction(climate: Climate, means: list[TenMinute]) -> DirectionRegr
     """
     _same_length(climate, means)
     weight = climate.weight
-    truth = _unwrapped(climate.from_deg, weight)
+    truth = unwrapped_deg(climate.from_deg, weight)
     truth = truth.reshape(-1, *(1,) * means[0].direction_bias_deg.ndim)
     bias = np.stack([mean.direction_bias_deg for mean in means])
     spread = np.stack([mean.direction_std_deg for mean in means]) ** 2  # of lidar - mast
@@ -120,7 +129,7 @@ def regress_direction(climate: Climate, means: list[TenMinute]) -> DirectionRegr
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = covariance / variance
     mast_variance = _mean(weight, (truth - centre_mast) ** 2 + mast)
-    residual = mast_variance - slope * covariance
+    residual = mast_variance - slope * covariance + np.asarray(lasting_deg2)
     return DirectionRegression(
         slope=slope,
         intercept_deg=centre_mast - slope * centre_lidar,
@@ -145,8 +154,14 @@ def _mean(weight: FloatArray, values: ArrayLike) -> FloatArray:
     return np.asarray(np.tensordot(weight, np.asarray(values), axes=1))
 
 
-def _unwrapped(from_deg: FloatArray, weight: FloatArray) -> FloatArray:
-    """Directions without the jump at north, within 180 degrees of their circular mean."""
+def unwrapped_deg(from_deg: FloatArray, weight: FloatArray) -> FloatArray:
+    """Directions without the jump at north, within 180 degrees of their circular mean [deg].
+
+    Examples
+    --------
+    >>> unwrapped_deg(np.array([350.0, 10.0, 20.0]), np.ones(3)).round(6).tolist()
+    [-10.0, 10.0, 20.0]
+    """
     angle = np.radians(from_deg)
     centre = np.degrees(np.arctan2(np.sum(weight * np.sin(angle)), np.sum(weight * np.cos(angle))))
     return np.asarray(centre % 360 + (from_deg - centre + 180) % 360 - 180)

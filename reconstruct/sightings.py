@@ -24,9 +24,9 @@ TURNS: tuple[Angle, ...] = ("heading_deg", "azimuth_offset_deg")  # told by azim
 RANK_SHARE = 1e-6
 
 # Dilution of precision: how many times worse an angle comes out than the best azimuth (or, of a tilt, elevation) is
-# measured, by the bearings alone. Up to 5 is called good where positions are found by satellites (Langley 1999, GPS
-# World 10 (5), 52-59); bearings of 0, 30 and 60 degrees have 8, of 0, 45 and 90 have 3.4, all around 0.8, three in a
-# line infinity.
+# measured, by the bearings alone (the notion is that of satellite positioning: Langley 1999, GPS World 10 (5), 52-59).
+# ASSUMED: up to 5 is called good there by rule of thumb. Bearings of 0, 30 and 60 degrees have 8, of 0, 45 and 90 have
+# 3.4, all around 0.8, three in a line infinity.
 GOOD_DILUTION = 5.0
 
 

@@ -143,7 +143,7 @@ def store_chunks(
     Yields
     ------
     Records
-        Sweeps are numbered through.
+        Sweeps are numbered through. What was lost is told with the first chunk alone.
     """
     chosen = _choose(path, instrument)
     size = max(values // (1 if range_m is not None else max(chosen.gates, 1)), 1)
@@ -151,7 +151,8 @@ def store_chunks(
         start = 0
         while start < chosen.rays:
             stop = _sweep_end(connection, chosen, start, start + size)
-            yield _read(connection, chosen, start, stop, range_m)
+            part = _read(connection, chosen, start, stop, range_m)
+            yield part if start == 0 else replace(part, losses=())
             start = stop
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
+from planner.checks.timing import PERIOD_TOLERANCE_S
 from planner.crossings import PairCrossing
 from planner.finding import Finding, Severity
 from planner.plan import Plan
@@ -11,8 +12,6 @@ from planner.plan import Plan
 # Noise across the beams grows as 1/sin: at 30° it is twice what it is at 90°, at 10° nearly six times.
 WARN_ANGLE_DEG = 30.0
 ERROR_ANGLE_DEG = 10.0
-# Periods of synchronised scans; they are written down to a tenth of a second.
-PERIOD_TOLERANCE_S = 0.05
 
 
 def find(plan: Plan) -> Iterator[Finding]:

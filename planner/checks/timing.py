@@ -9,7 +9,7 @@ from reconstruct.periods import TEN_MINUTES_S
 
 # Scans in ten minutes.
 FEWEST_SCANS = 12
-# Declared against computed; periods are written down to a tenth of a second.
+# Declared against computed, and against that of the scan it runs with; periods are written down to a tenth of a second.
 PERIOD_TOLERANCE_S = 0.05
 # A sector whose axis is farther from the prevailing wind sees more of it across than along.
 AXIS_LIMIT_DEG = 45.0

@@ -28,6 +28,11 @@ FidelityOption = Annotated[
 ]
 
 
+def names_in(text: str | None) -> tuple[str, ...]:
+    """The names of a list with commas; none without it."""
+    return () if text is None else tuple(part.strip() for part in text.split(","))
+
+
 def say(text: str) -> None:
     """Print a result on standard output."""
     typer.echo(text)

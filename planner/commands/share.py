@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from planner.commands.options import JsonOption, QuietOption, SiteArgument, remark, say_json
+from planner.commands.options import JsonOption, QuietOption, SiteArgument, names_in, remark, say_json
 
 if TYPE_CHECKING:
     from planner.placement.sharing import Shared
@@ -39,7 +39,7 @@ def share(
     from planner.files.yaml_site import load_site
     from planner.placement.sharing import shared_by
 
-    names, found = shared_by(load_site(site), lidars=_names(lidars), targets=_names(targets))
+    names, found = shared_by(load_site(site), lidars=names_in(lidars), targets=names_in(targets))
     if json:
         say_json({"lidars": list(names), "targets": [item._asdict() for item in found]})
         return
@@ -55,10 +55,6 @@ def share(
         "square root of their number, pointing and position errors stay. `lidarplan tour` gives the order and its time.",
         quiet=quiet,
     )
-
-
-def _names(text: str | None) -> tuple[str, ...]:
-    return () if text is None else tuple(part.strip() for part in text.split(","))
 
 
 def _row(item: "Shared") -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from planner.commands.options import JsonOption, QuietOption, SiteArgument, remark, say_json
+from planner.commands.options import JsonOption, QuietOption, SiteArgument, names_in, remark, say_json
 
 if TYPE_CHECKING:
     from planner.site_tour import SiteTour
@@ -52,8 +52,8 @@ def tour(
     plan = load_plan(site)
     found = site_tour(
         plan.exact_places,
-        lidars=_names(lidars),
-        targets=_names(targets),
+        lidars=names_in(lidars),
+        targets=names_in(targets),
         cover_m=cover,
         accumulation_s=accumulation,
     )
@@ -68,10 +68,6 @@ def tour(
         "The order is the best that was found, without a proof.",
         quiet=quiet,
     )
-
-
-def _names(text: str | None) -> tuple[str, ...]:
-    return () if text is None else tuple(part.strip() for part in text.split(","))
 
 
 def _steps(found: "SiteTour") -> list[dict[str, object]]:

@@ -24,6 +24,7 @@ from planner.palette import (
     PAPER,
     TURBINE,
     WAKE,
+    WAKE_DIAMETERS,
     lidar_colour,
 )
 from planner.plan import Plan
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 
 ARC_SHARE = 0.15  # of the shorter beam: radius of the opening angle's arc
 RING_SHARE = (0.055, 0.075)  # of the map's side: inner and outer radius of the ring of excluded directions
-WAKE_DIAMETERS = 8  # how much of a wake is drawn; a wake goes on
-NO_TARGET_REACH_M = 1000.0  # how far a scan without gates and target is drawn
 SAMPLES = 60  # along a line that names had better not cover
 FEW_RAYS = 120  # more are drawn as an area only
 
@@ -90,13 +89,8 @@ def scans(plan: Plan, axes: "Axes") -> Iterator[Layer]:
     )
 
 
-def _reach_m(layout: ScanLayout) -> float:
-    ranges = [layout.measured_range_m(float(value)) for value in layout.aim.range_m]
-    return max(ranges, default=layout.gates.last_m if layout.gates else NO_TARGET_REACH_M)
-
-
 def _fan(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
-    colour, reach_m = lidar_colour(layout.lidar_index), _reach_m(layout)
+    colour, reach_m = lidar_colour(layout.lidar_index), layout.drawn_reach_m
     azimuth_deg, elevation_deg = layout.edges_deg()
     head = plan.places.local_m(layout.lidar.position)[:2]
     arc = plan.places.beam_local_m(
@@ -144,7 +138,7 @@ def _lost(axes: "Axes", head: FloatArray, ends: FloatArray, share: FloatArray) -
 
 def _stare(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:
     """One ray, and the probe of its measured gate."""
-    return _ray(plan, axes, layout, 0, _reach_m(layout), 1.8)
+    return _ray(plan, axes, layout, 0, layout.drawn_reach_m, 1.8)
 
 
 def _points(plan: Plan, axes: "Axes", layout: ScanLayout) -> Layer:

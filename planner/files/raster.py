@@ -9,7 +9,8 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import InputError, UnavailableError
-from geometry.terrain import HeightDatum, HeightRaster
+from geometry.frames import HeightDatum
+from geometry.terrain import HeightRaster
 
 
 def load_terrain(

@@ -17,6 +17,7 @@ from geometry.projection import projection_of
 from geometry.wakes import wake_outline_m
 from planner.exclusion import Exclusion
 from planner.nouns import Noun
+from planner.palette import WAKE_DIAMETERS
 from planner.places import Places
 from planner.plan import Plan
 from planner.scan_layout import ScanLayout
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 # A straight beam is a bent line in a map: pieces of 250 m stay within 1.3 mm of it (d²/8R).
 PIECE_M = 250.0
-NO_TARGET_REACH_M = 1000.0  # how far a scan without gates and target is drawn
-WAKE_DIAMETERS = 8  # how much of a wake is drawn; a wake goes on
 PIE_M = 300.0  # radius of the excluded directions around a target
 PIE_STEP_DEG = 2.0
 
@@ -148,12 +147,6 @@ def _any_given(key: str, records: Iterable[Record]) -> bool:
     return any(record.get(key) is not None for record in records)
 
 
-def reach_m(layout: ScanLayout) -> float:
-    """How far a scan is drawn: to the measured gate of its farthest target, else to its last gate [m]."""
-    ranges = [layout.measured_range_m(float(value)) for value in layout.aim.range_m]
-    return max(ranges, default=layout.gates.last_m if layout.gates else NO_TARGET_REACH_M)
-
-
 def beam_m(
     places: Places, layout: ScanLayout, azimuth_deg: float, elevation_deg: float, to_m: float
 ) -> FloatArray:
@@ -167,7 +160,7 @@ def _beams(plan: Plan, layout: ScanLayout) -> "Iterable[tuple[BaseGeometry, Reco
     import shapely
 
     places, scan = plan.exact_places, layout.scan
-    to_m = reach_m(layout)
+    to_m = layout.drawn_reach_m
     head_azimuth, head_elevation = layout.mounting.to_head(scan.azimuth_deg, scan.elevation_deg)
     for ray in range(scan.count):
         azimuth_deg, elevation_deg = float(scan.azimuth_deg[ray]), float(scan.elevation_deg[ray])
@@ -194,7 +187,7 @@ def _sector(plan: Plan, layout: ScanLayout) -> "Iterable[tuple[BaseGeometry, Rec
 
     if layout.spec.type not in ("sector", "ppi"):
         return
-    to_m = reach_m(layout)
+    to_m = layout.drawn_reach_m
     azimuth_deg, elevation_deg = layout.edges_deg()
     enu = to_m * unit_vector(azimuth_deg, elevation_deg)
     arc = plan.exact_places.frame.projected_m(layout.lidar.position, enu)

@@ -210,7 +210,15 @@ def _parts(path: Path | None) -> dict[str, dict[Batch, Any]]:
         return {}
     try:
         return dict(pickle.loads(path.read_bytes()))
-    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, TypeError) as error:
+    except (
+        pickle.UnpicklingError,
+        EOFError,
+        AttributeError,
+        ImportError,
+        IndexError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise InputError(
             f"{path}: the progress file cannot be read ({error}); remove it to start anew"
         ) from error

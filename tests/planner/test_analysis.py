@@ -5,6 +5,7 @@ import json
 import math
 import os
 import shutil
+import sqlite3
 import subprocess
 import sys
 import time
@@ -165,6 +166,21 @@ def test_a_store_is_read_in_small_chunks_with_the_same_result(tmp_path: Path) ->
         retrieve(load_campaign(changed(path, ("output: results", "output: results\nchunk_rays: 200"))))
     assert max(seen) <= 230
     pd.testing.assert_frame_equal(means(tmp_path), whole)
+
+
+def test_what_is_lost_in_several_chunks_is_counted_together(tmp_path: Path) -> None:
+    """Two rays without an azimuth, some hundred apart, in chunks of 200."""
+    pytest.importorskip("sqlalchemy", reason="the extra 'db' is not installed")
+    path = changed(
+        made(tmp_path, days=1 / 144, kind="database"), ("output: results", "output: results\nchunk_rays: 200")
+    )
+    with sqlite3.connect(tmp_path / "rays.sqlite") as connection:
+        first = "(SELECT min(gw_id) FROM control WHERE scn_id = 1)"
+        connection.execute(f"UPDATE control SET azim = NULL WHERE gw_id IN ({first} + 50, {first} + 650)")
+    connection.close()
+    notes = [note for told in retrieve(load_campaign(path)).notes.values() for note in told]
+    lost = [note for note in notes if note.startswith("lost: ")]
+    assert lost == ["lost: control: a ray without time, angles or measurement (2 times)"]
 
 
 def test_an_unfinished_run_leaves_no_result_and_goes_on_where_it_was(

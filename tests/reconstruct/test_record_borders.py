@@ -156,3 +156,11 @@ def test_a_stare_is_read_in_chunks_of_the_size_asked_for(tmp_path: Path, values:
         np.concatenate([chunk.radial_speed_mps for chunk in chunks]), whole.radial_speed_mps[:, 1:]
     )
     assert {int(number) for chunk in chunks for number in chunk.sweep_id} == {0}
+
+
+def test_what_a_store_lost_is_told_with_the_first_chunk_alone(tmp_path: Path) -> None:
+    path = tmp_path / "rays.duckdb"
+    write_store(path, replace(some(), losses=(Loss("a.txt", "cut", 3, times=2),)))
+    chunks = list(store_chunks(path, values=20))
+    assert len(chunks) > 1
+    assert [chunk.losses for chunk in chunks] == [(Loss("a.txt", "cut", 3, 2),), *[()] * (len(chunks) - 1)]

@@ -9,7 +9,7 @@ from geometry.gates import Probe
 from reconstruct.beam_means import add_beam_sums, along_beam_mps, beam_means, beam_sums
 from reconstruct.monte_carlo import Settings, simulate
 from reconstruct.multi_doppler import triple_doppler_wind
-from reconstruct.pairing import RaySeries, joint_wind
+from reconstruct.pairing import RaySeries, compare_gaps, joint_wind
 from reconstruct.prediction import predict_noise
 from reconstruct.rays import Rays
 from reconstruct.scan_grid import alternating_passes
@@ -132,3 +132,16 @@ def test_every_ray_of_two_beams_stands_in_one_pass_whatever_is_missing() -> None
     assert grouped["azimuth"].nunique().eq(grouped.size()).all()
     assert grouped.size().max() == 2
     assert (grouped["second"].max() - grouped["second"].min()).max() <= 1
+
+
+def test_gaps_are_compared_with_the_columns_of_the_pair() -> None:
+    """Three level beams know nothing of w: two columns give the spread of 8 and 10 m/s from the south in turns, 1 m/s."""
+    time = START + np.arange(600) * np.timedelta64(1, "s")
+    north = np.where(np.arange(600) % 2, 8.0, 10.0)
+    level = [
+        RaySeries(time, np.full(600, azimuth), np.zeros(600), north * np.cos(np.radians(azimuth)))
+        for azimuth in (0.0, 120.0, 240.0)
+    ]
+    (found,) = compare_gaps(*level, gaps_s=[0.5], columns=2)
+    assert found.pairs == 600
+    assert found.spread_mps == pytest.approx(1.0, rel=2e-3)
