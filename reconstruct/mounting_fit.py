@@ -15,6 +15,7 @@ from reconstruct.sightings import ANGLES, Angle, Sighting, angles_left, undeterm
 
 OUTLIER_CHANCE = 1e-3  # residuals that good data have less often than this are called an outlier's
 SIGNIFICANT_CHANCE = 0.05  # two-sided
+STEEPEST_DEG = 80.0  # pitch or roll of a head that measures anything
 
 
 class Residual(NamedTuple):
@@ -172,15 +173,20 @@ def _solved(
     begin = np.array([getattr(start, angle) for angle in solve], dtype=np.float64)
     arguments = (items, start, solve, white)
     begin = begin + _turned(items, start, solve)
-    robust = least_squares(whitened, begin, args=arguments, loss="soft_l1", x_scale=0.1)
-    exact = least_squares(whitened, robust.x, args=arguments, x_scale=0.1, xtol=1e-12, ftol=1e-12)
+    most = np.array([STEEPEST_DEG if angle in ("pitch_deg", "roll_deg") else np.inf for angle in solve])
+    inside = (-most, most)  # far from the solution a step may be wild
+    robust = least_squares(whitened, begin, args=arguments, loss="soft_l1", x_scale=0.1, bounds=inside)
+    exact = least_squares(
+        whitened, robust.x, args=arguments, x_scale=0.1, xtol=1e-12, ftol=1e-12, bounds=inside
+    )
     slopes = np.asarray(exact.jac, dtype=np.float64)
     return np.asarray(exact.x), slopes.T @ slopes, float(2.0 * exact.cost)
 
 
 def _turned(items: list[Sighting], start: Mounting, solve: tuple[Angle, ...]) -> FloatArray:
     """A first turn about up [deg], the median of all, so that a head set up anyhow is found as well."""
-    across = angles_left(items, start)[:, 0]
+    true = beam_to(np.array([item.enu_m for item in items]))
+    across = angles_left(items, start)[:, 0] / np.cos(np.deg2rad(true.elevation_deg))
     first = np.zeros(len(solve))
     for angle in ("azimuth_offset_deg", "heading_deg"):
         if angle in solve:

@@ -12,6 +12,7 @@ from planner.scene.solids import azimuth_direction
 
 OVERVIEW_ELEVATION_DEG = 30.0  # low enough to see heights, high enough to see the plan
 CLOSE_UP_ELEVATION_DEG = 16.0
+NEAREST_M = 1.0  # no point is nearer to the camera
 
 
 def camera_axes(view: View) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -96,7 +97,7 @@ def view_from(
     shift_x, distance_x = _frame(x, z, tangent * aspect)
     shift_y, distance_y = _frame(y, z, tangent)
     focus = middle + shift_x * right + shift_y * up
-    distance = max(distance_x, distance_y, 1.0)
+    distance = max(distance_x, distance_y, NEAREST_M - float(z.min()))  # a line seen end-on has no width
     return View(name, focus + distance * toward, focus, view_angle_deg)
 
 
