@@ -13,9 +13,8 @@ import numpy as np
 from geometry.arrays import ArrayLike, BoolArray, FloatArray
 from geometry.errors import InputError
 
-# Decay of a wake on land, and offshore: Katic, Højstrup & Jensen (1986), and the practice of Park.
+# Decay of a wake on land (offshore 0.04 to 0.05): Katic, Højstrup & Jensen (1986), and the practice of Park.
 DECAY_ONSHORE = 0.075
-DECAY_OFFSHORE = 0.04
 
 # Distances over diameters between which IEC 61400-12-1, Annex A, means its formula (since 2022 in IEC 61400-12-5).
 IEC_NEAREST_DIAMETERS = 2.0

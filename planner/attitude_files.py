@@ -29,7 +29,7 @@ def told_drifts(log: Logged) -> list[str]:
     --------
     >>> told_drifts(Logged({"heading_deg": Drift(0.5, 0.1, 1.0, 0.012, True, 144, 90.0)}, 3))
     ['logged heading: mean change +0.50°; drift +1.000 ± 0.012° a day over 144 means of ten minutes (significant at 5 %)',
-     '3 rays have no logged attitude: they take the nearest one']
+     'rays without a logged attitude, which take the nearest one: 3']
     """
     lines = []
     for name, drift in log.drifts.items():
@@ -43,7 +43,7 @@ def told_drifts(log: Logged) -> list[str]:
         slope = f"{drift.per_day_deg:+.3f} ± {drift.standard_error_deg:.3f}° a day"
         lines.append(f"{angle}; drift {slope} over {drift.means} means of ten minutes ({verdict})")
     if log.unlogged:
-        lines.append(f"{log.unlogged} rays have no logged attitude: they take the nearest one")
+        lines.append(f"rays without a logged attitude, which take the nearest one: {log.unlogged}")
     return lines
 
 

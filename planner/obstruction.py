@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import ArrayLike, BoolArray, FloatArray
-from geometry.earth import EARTH_RADIUS_M
+from geometry.head import Mounting
 from geometry.sightlines import clearance
 from geometry.solids import Boxes, Cylinders, Solids, Spheres
 from planner.places import Places
 from planner.scan_layout import ScanLayout
 from planner.scan_plans import PointsScan, RasterScan
 from planner.site import Lidar, Site
+from reconstruct.sea_level import SEEN_RADIUS_M, sea_range_m
 
 # A beam is called near where it passes within this many standard deviations of its own position.
 MARGIN_STDS = 2.0
@@ -107,7 +108,7 @@ def margin_m(lidar: Lidar, range_m: float) -> float:
 
 
 def ground_met_m(height_m: float, elevation_deg: ArrayLike) -> FloatArray:
-    """Where straight beams first meet level ground that curves with the Earth.
+    """Where beams first meet level ground that curves with the Earth: the same as over the sea, refraction included.
 
     Parameters
     ----------
@@ -119,19 +120,16 @@ def ground_met_m(height_m: float, elevation_deg: ArrayLike) -> FloatArray:
     Returns
     -------
     FloatArray
-        (...,) slant range [m], the smaller root r of h + r sin φ + (r cos φ)²/2R = 0; infinite where the beam
+        (...,) slant range [m], the smaller root r of h + r sin φ + (1 - k)(r cos φ)²/2R = 0; infinite where the beam
         stays above the ground.
 
     Examples
     --------
     >>> ground_met_m(10.0, [-1.0, -0.05, 0.0, 3.0]).round(1).tolist()
-    [574.5, inf, inf, inf]
+    [574.3, inf, inf, inf]
     """
-    elevation = np.deg2rad(np.asarray(elevation_deg, dtype=np.float64))
-    down, bend = -np.sin(elevation), 2 * height_m * np.cos(elevation) ** 2 / EARTH_RADIUS_M
-    meets = (down > 0.0) & (down**2 >= bend)
-    root = down + np.sqrt(np.where(meets, down**2 - bend, 0.0))
-    return np.where(meets, 2 * height_m / np.where(meets, root, 1.0), np.inf)
+    met = sea_range_m(0.0, elevation_deg, height_m=height_m, mounting=Mounting(), radius_m=SEEN_RADIUS_M)
+    return np.where(np.isnan(met), np.inf, met)
 
 
 def _of_ground(places: Places, layout: ScanLayout) -> Iterator[Obstruction]:
@@ -152,7 +150,7 @@ def _of_ground(places: Places, layout: ScanLayout) -> Iterator[Obstruction]:
         return
     elevation = np.deg2rad(lowest_deg)
     end_m = (
-        height_m + wanted_m * np.sin(elevation) + (wanted_m * np.cos(elevation)) ** 2 / (2 * EARTH_RADIUS_M)
+        height_m + wanted_m * np.sin(elevation) + (wanted_m * np.cos(elevation)) ** 2 / (2 * SEEN_RADIUS_M)
     )
     range_m = float(met_m[lost].min())
     yield Obstruction(

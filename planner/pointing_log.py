@@ -91,7 +91,7 @@ def require_log(asked: Attitude) -> str:
     """
     if asked.path is None:
         return ""
-    _read_log(asked.path, asked.time, (asked.heading, asked.pitch, asked.roll), asked.separator)
+    _read_log(*_log_key(asked))
     stat = Path(asked.path).stat()
     return f"{stat.st_size} {stat.st_mtime_ns}"
 
@@ -133,6 +133,8 @@ def _mounted(records: Records, item: RayInput, layout: ScanLayout, places: Place
     """Pointing angles by the mounting and what is logged of it."""
     stands, asked = mounting_of(item, layout, places), item.attitude
     logged = _logged(records, asked)
+    if asked.path is not None and (lost := _read_log(*_log_key(asked))[2]):
+        records = _noted(records, lost)
     there = np.isfinite(logged)
     if not np.any(there):
         unlogged = records.rays if known.reference_deg is not None else 0
@@ -175,8 +177,7 @@ def _logged(records: Records, asked: Attitude) -> FloatArray:
 
 def _interpolated(time_utc: TimeArray, asked: Attitude) -> list[FloatArray]:
     """The columns of a separate log at the times of rays; NaN before its beginning and after its end."""
-    names = (asked.heading, asked.pitch, asked.roll)
-    stamps, logged = _read_log(asked.path or "", asked.time, names, asked.separator)
+    stamps, logged, _ = _read_log(*_log_key(asked))
     ticks = time_utc.astype(np.int64).astype(float)
     found = []
     for column in logged:
@@ -189,11 +190,25 @@ def _interpolated(time_utc: TimeArray, asked: Attitude) -> list[FloatArray]:
     return found
 
 
+def _log_key(asked: Attitude) -> tuple[str, str, tuple[str, str, str], str, int]:
+    """What `_read_log` is asked with; a file that has been written since is read again."""
+    path, names = asked.path or "", (asked.heading, asked.pitch, asked.roll)
+    written = Path(path).stat().st_mtime_ns if Path(path).is_file() else 0
+    return path, asked.time, names, asked.separator, written
+
+
 @lru_cache(maxsize=8)
 def _read_log(
-    path: str, time: str, names: tuple[str, str, str], separator: str
-) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """Times [ns since 1970], rising, and heading, pitch and roll of a CSV; NaN for a column that it does not have."""
+    path: str,
+    time: str,
+    names: tuple[str, str, str],
+    separator: str,
+    written: int,  # noqa: ARG001 - part of the key
+) -> tuple[FloatArray, tuple[FloatArray, ...], str]:
+    """Times [ns since 1970], rising, heading, pitch and roll of a CSV, and what of it was lost, in words.
+
+    A column that it does not have is NaN.
+    """
     import pandas as pd
 
     try:
@@ -207,20 +222,24 @@ def _read_log(
             "names under `attitude`"
         )
     stamps = pd.to_datetime(frame[time], utc=True, errors="coerce", format="ISO8601")
+    timeless = int(stamps.isna().sum())
     frame = frame[stamps.notna()].assign(**{time: stamps[stamps.notna()]}).sort_values(time, kind="stable")
     if frame.empty:
         raise InputError(f"attitude log {path} has no time in {time}: it has to be ISO 8601, UTC")
     ticks = (
         frame[time].dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64).astype(float)
     )
-    nothing = np.full(len(frame), np.nan)
-    columns = (
-        pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=float)
-        if name in frame.columns
-        else nothing
-        for name in names
-    )
-    return ticks, tuple(columns)
+    columns, wrong = [], 0
+    for name in names:
+        if name not in frame.columns:
+            columns.append(np.full(len(frame), np.nan))
+            continue
+        numbers = pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=float)
+        wrong += int(np.count_nonzero(~np.isfinite(numbers) & frame[name].notna().to_numpy()))
+        columns.append(np.where(np.isfinite(numbers), numbers, np.nan))
+    counts = {"rows without a time": timeless, "angles that are no number": wrong}
+    lost = ", ".join(f"{what}: {count}" for what, count in counts.items() if count)
+    return ticks, tuple(columns), f"lost: {Path(path).name}, {lost}" if lost else ""
 
 
 def _reference(time_utc: TimeArray, logged: FloatArray, asked: Attitude) -> tuple[float, float, float]:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 TimeArray = NDArray[np.datetime64]
 
-MINUTE_S = 60.0
-
 
 @dataclass(frozen=True, eq=False)
 class PeriodSums:

@@ -26,11 +26,6 @@ class Choice(NamedTuple):
     compared: int  # candidates of which every set was tried
     candidates: int  # that there were
 
-    @property
-    def worst_deg(self) -> float:
-        """Standard deviation of the least known angle [deg]."""
-        return max(self.std_deg)
-
 
 def best_targets(
     sightings: Sequence[Sighting],

@@ -12,7 +12,6 @@ from planner.placement.echo import echo
 from planner.placement.maps import Look
 from planner.placement.task import Aggregate, Task
 from planner.scan_plans import SectorScan
-from planner.site import Lidar
 from planner.wind_climate import error_sources, turbulence
 from reconstruct.beam_table import Criterion, condensed
 from reconstruct.climate import Climate
@@ -222,8 +221,3 @@ def lidar_names(task: Task) -> tuple[str, ...]:
     placed = [task.pattern] if task.count == 1 else []
     several = [f"lidar {number}" for number in range(1, task.count + 1)] if task.count > 1 else []
     return (*(lidar.name for lidar in task.fixed), *(lidar.name for lidar in placed), *several)
-
-
-def lidars_of(task: Task) -> tuple[Lidar, ...]:
-    """The lidars of a set: those that stand, then copies of the pattern."""
-    return (*task.fixed, *[task.pattern] * task.count)

@@ -22,6 +22,7 @@ def delimited_frame(
     Returns
     -------
     frame : pandas.DataFrame
+        Its index is the line in the file, counted from 1.
     losses : list of Loss
         Lines with another number of fields than the header, and cells that should be numbers and are not (NaN
         then).
@@ -51,6 +52,7 @@ def delimited_frame(
     frame = pd.read_csv(
         io.StringIO(body), sep=separator, decimal=decimal, header=None, names=names, low_memory=False
     )
+    frame.index = pd.Index(np.flatnonzero(good) + 2)
     for name in names[1:]:
         if frame[name].dtype.kind not in "fiub":
             frame[name], lost = _numbers(frame[name], path.name, name)
@@ -81,4 +83,4 @@ def _numbers(column: "pd.Series[str]", where: str, name: str) -> tuple["pd.Serie
     if wrong.mean() > 0.5:
         return column, []  # type: ignore[return-value]
     what = f"{str(column[wrong].iloc[0])[:20]!r} in {name} is no number"
-    return numbers, [Loss(where, what, int(np.flatnonzero(wrong)[0]) + 2, int(wrong.sum()))]
+    return numbers, [Loss(where, what, int(column.index[wrong][0]), int(wrong.sum()))]

@@ -11,9 +11,6 @@ from reconstruct.formats.text import lines_of, number_tables
 from reconstruct.formats.time_order import forward
 from reconstruct.losses import Loss
 
-#: Fields of a scanner file: id; azimuth; elevation; counter.
-SCANNER_FIELDS = 4
-
 #: A sample further than this from both of its neighbours, which agree, is damage: a head that turns its
 #: fastest, 100 degrees a second, comes 2 degrees further from sample to sample [deg].
 SPIKE_DEG = 10.0

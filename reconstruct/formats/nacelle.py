@@ -151,7 +151,7 @@ def _quality(frame: pd.DataFrame, where: str, limit_deg: float) -> tuple[pd.Data
     for what, passed in rules:
         lost = int(np.sum(kept & ~passed))
         if lost:
-            losses.append(Loss(where, what, line=int(np.flatnonzero(kept & ~passed)[0]) + 2, times=lost))
+            losses.append(Loss(where, what, line=int(frame.index[kept & ~passed][0]), times=lost))
         kept &= passed
     return frame[kept], losses
 

@@ -53,14 +53,14 @@ def read_plain_csv(path: Path, options: Options | None = None) -> Records:
     frame, losses = delimited_frame(
         path, separator=options.columns.separator, decimal=options.columns.decimal
     )
-    table, notes = _renamed(frame, options.columns, path)
+    table, notes, unread = _renamed(frame, options.columns, path)
     table, dropped = _usable(table, path.name)
     if table.empty:
         raise InputError(f"{path}: no row has a time, angles and a range")
     records = _records(table, options, path.name)
     notes += ["columns renamed by the column map"]
     return replace(
-        records, notes=(*records.notes, *notes), losses=(*losses, *dropped, *records.losses)
+        records, notes=(*records.notes, *notes), losses=(*losses, *unread, *dropped, *records.losses)
     ).mounted(options.mounting)
 
 
@@ -81,8 +81,10 @@ def _own(path: Path, options: Options) -> Records:
     ).mounted(options.mounting)
 
 
-def _renamed(frame: "pd.DataFrame", columns: ColumnMap, path: Path) -> "tuple[pd.DataFrame, list[str]]":
-    """Our columns of the file's, times and signs turned."""
+def _renamed(
+    frame: "pd.DataFrame", columns: ColumnMap, path: Path
+) -> "tuple[pd.DataFrame, list[str], list[Loss]]":
+    """Our columns of the file's, times and signs turned, with notes, and cells that are no numbers."""
     import pandas as pd
 
     unknown = sorted((set(columns.names) | set(columns.constants)) - set(NEEDED) - set(MAY))
@@ -95,11 +97,16 @@ def _renamed(frame: "pd.DataFrame", columns: ColumnMap, path: Path) -> "tuple[pd
             f"{path}: no column for {', '.join(absent)}; the file has {', '.join(map(str, frame.columns))}"
         )
     out: dict[str, Any] = {}
+    losses = []
     for own, name in columns.names.items():
         if own == "time_utc":
             out[own] = to_times(frame[name], unit=columns.time_unit)
             continue
         values = pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=float)
+        wrong = np.isnan(values) & frame[name].notna().to_numpy()
+        if wrong.any():
+            first = int(frame.index[wrong][0])
+            losses.append(Loss(path.name, f"no number in {name}", first, int(wrong.sum())))
         values = np.where(np.isin(values, columns.missing), np.nan, values)
         out[own] = pd.Series(values * columns.factors.get(own, 1.0), index=frame.index)
     table = pd.DataFrame(out).assign(**dict(columns.constants))
@@ -107,14 +114,14 @@ def _renamed(frame: "pd.DataFrame", columns: ColumnMap, path: Path) -> "tuple[pd
     if columns.speed_positive == "toward":
         table["radial_speed_mps"] = -table["radial_speed_mps"]
         notes.append("radial speeds turned from positive toward to positive away")
-    return table, notes
+    return table, notes, losses
 
 
 def _usable(table: "pd.DataFrame", where: str) -> "tuple[pd.DataFrame, list[Loss]]":
     known = table[list(NEEDED[:4])].notna().all(axis=1).to_numpy()
     if known.all():
         return table, []
-    first = int(np.flatnonzero(~known)[0]) + 2
+    first = int(table.index[~known][0])
     return table[known], [Loss(where, "no time, angle or range", first, int(np.sum(~known)))]
 
 

@@ -176,9 +176,8 @@ def _from_estimate(records: Records, options: Options) -> Records:
         return _noted(records, f"azimuths as stored: there is no scanner file, and {error}")
     note = (
         f"there is no scanner file: azimuths turned back by {found.lead_deg:.2f} +- {found.std_deg:.2f} deg, "
-        f"the lead that up- against down-sweeps show ({found.sweeps} sweeps); {moved} rays off the even "
-        "motion "
-        "of their sweep were brought onto it"
+        f"the lead that up- against down-sweeps show ({found.sweeps} sweeps); rays off the even "
+        f"motion of their sweep and brought onto it: {moved}"
     )
     return _noted(without_lead(even, found.lead_deg), note)
 

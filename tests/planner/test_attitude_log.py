@@ -149,6 +149,16 @@ def test_a_separate_log_is_followed_by_its_columns_and_signs(clean: Path) -> Non
         run(clean, f"attitude: {{path: {clean.parent / 'log.csv'}}}")
 
 
+def test_rows_of_a_log_that_say_nothing_are_counted(clean: Path) -> None:
+    table = pd.read_csv(clean.parent / "log.csv", dtype=str)
+    table.loc[[3, 5], "when"] = ["soon", None]
+    table.loc[7, "Yaw"] = "north"
+    table.to_csv(clean.parent / "damaged.csv", index=False)
+    columns = f"path: {clean.parent / 'damaged.csv'}, time: when, heading: Yaw, pitch: Tilt"
+    found, _ = run(clean, f"attitude: {{{columns}, factors: {{pitch_deg: -1}}}}")
+    assert "lost: damaged.csv, rows without a time: 2, angles that are no number: 1" in found.notes["sector"]
+
+
 def test_the_reference_of_the_log_may_be_given(clean: Path) -> None:
     """A compass that showed half a degree less while targets were mapped: all rays turn by as much."""
     _, error = run(clean, f"attitude: {{reference: {{heading_deg: {COMPASS - 0.5}}}}}")

@@ -112,10 +112,13 @@ def test_the_margin_is_two_standard_deviations_of_the_worse_direction(moor: Moor
 
 
 def test_where_a_beam_meets_the_round_earth_by_brute_force() -> None:
-    """Distance to the Earth's centre along the beam, in steps of 1 m, first below the ground's radius."""
-    radius_m, height_m = 6_371_000.0, 10.0
+    """Distance to the Earth's centre along the beam, in steps of 1 m, first below the ground's radius.
+
+    To a beam that bends with 0.13 of the Earth's curvature the Earth seems that much flatter.
+    """
+    radius_m, height_m = 6_371_000.0 / (1.0 - 0.13), 10.0
     along = np.arange(0.0, 20_000.0)
-    for elevation_deg in (-3.0, -0.2, -0.102, -0.1, 0.0, 5.0):
+    for elevation_deg in (-3.0, -0.2, -0.0952, -0.093, 0.0, 5.0):
         turn = np.deg2rad(elevation_deg)
         up = np.hypot(radius_m + height_m + along * np.sin(turn), along * np.cos(turn)) - radius_m
         met = along[up < 0.0]

@@ -328,6 +328,25 @@ def test_a_column_map_turns_any_csv_into_rays(tmp_path):
         read(path, kind="csv")
 
 
+def test_cells_that_are_no_numbers_are_counted_at_their_line_of_the_file(tmp_path):
+    """After a blank and a cut line; few of them, or most of a column."""
+    own = ("time_utc", "azimuth_deg", "elevation_deg", "range_m", "radial_speed_mps", "cnr_db")
+    rows = [
+        f"2020-01-01T00:00:0{n},{n},0,100,{'fast' if n == 3 else n},{'-9' if n == 3 else '?'}"
+        for n in range(6)
+    ]
+    path = tmp_path / "rays.csv"
+    path.write_text("\n".join(["t,a,e,r,v,c", "", "cut,off", *rows]), encoding="utf-8")
+    columns = ColumnMap(names=dict(zip(own, "taervc", strict=True)))
+    records = read(path, kind="csv", options=Options(columns=columns))
+    assert records.rays == 6
+    assert {loss.what.split(":")[0]: (loss.line, loss.times) for loss in records.losses} == {
+        "another number of fields than the 6 of the header": (3, 1),
+        "'fast' in v is no number": (7, 1),
+        "no number in c": (4, 5),
+    }
+
+
 def test_our_own_tables_need_no_column_map(tmp_path):
     path = write_campaign(tmp_path, rays=12, scanner=False)
     records = read_windscanner(path, Options(azimuth="stored"))
