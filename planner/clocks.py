@@ -9,7 +9,7 @@ from geometry.arrays import FloatArray
 from geometry.beams import unit_vector
 from geometry.errors import InputError
 from planner.campaign_logs import SonicInput
-from planner.mast_file import WindSeries, read_sonic
+from planner.mast_file import WindSeries, lost_of, read_sonic, sonic_columns
 from reconstruct.alignment import Lag, Trim, orientation_trim, sample_lag, two_sonics_trim
 from reconstruct.averaging import TimeArray
 from reconstruct.pairing import RaySeries
@@ -38,6 +38,7 @@ class SonicTrim(NamedTuple):
     lag: ClockLag  # of the rays after the sonic
     trim: Trim  # to be added to the sonic's directions, clockwise
     means: int  # of two minutes, that were compared
+    lost: str  # what of its file cannot be used, in words; empty where all can
 
 
 def clock_lag(series: Iterable[RaySeries], mast: WindSeries, *, longest_s: float) -> ClockLag:
@@ -125,7 +126,8 @@ def trim_sonic(sonic: SonicInput, series: Callable[[], Iterable[RaySeries]]) -> 
         azimuth, elevation, speed, u, v = np.concatenate(parts).T
         trim = orientation_trim(azimuth, elevation, speed, u, v)
         angle_deg = trim.trim_deg
-    return SonicTrim(sonic.scan, lag, trim, len(speed)), _turned(moved, angle_deg)
+    lost = lost_of(sonic.path, sonic.separator, sonic.time, sonic_columns(sonic))
+    return SonicTrim(sonic.scan, lag, trim, len(speed), lost), _turned(moved, angle_deg)
 
 
 def _two_minute_means(rays: RaySeries, wind: WindSeries) -> FloatArray:
@@ -156,6 +158,7 @@ def told_trims(trims: dict[str, SonicTrim]) -> list[str]:
             f"sonic {name} against {each.scan}: turned by {each.trim.trim_deg:+.2f}°; its mismatch over {each.means} means "
             f"of two minutes falls from {each.trim.before_mps:.3f} to {each.trim.after_mps:.3f} m/s"
             + ("" if lag is UNTRIED else f"; {late}")
+            + (f"; {each.lost}" if each.lost else "")
         )
     if len(trims) == 2:
         one, other = (each.trim for each in trims.values())

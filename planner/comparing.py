@@ -12,7 +12,7 @@ from geometry.errors import InputError
 from planner.campaign import Campaign, MastInput
 from planner.error_nouns import SizeError
 from planner.files.yaml_campaign import Loaded
-from planner.mast_file import read_mast
+from planner.mast_file import lost_of, read_mast
 from planner.plan import Plan
 from planner.scan_jobs import job_name
 from reconstruct.agreement import Difference, set_beside
@@ -91,6 +91,7 @@ class Comparison(NamedTuple):
     mast_weibull: WeibullFit
     period_s: float
     levels: Mapping[float | None, PeriodMeans]  # of the mast, by height
+    lost: str  # what of the mast's file cannot be used, in words; empty where all can
 
 
 def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -> Comparison:
@@ -136,7 +137,20 @@ def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -
         for each in matched
     )
     widest = max(matched, key=lambda each: len(each.time_utc))
-    return Comparison(rows, fit_weibull(widest.mast_mps), campaign.averaging.compare_s, levels)
+    return Comparison(
+        rows,
+        fit_weibull(widest.mast_mps),
+        campaign.averaging.compare_s,
+        levels,
+        _lost(campaign.mast),
+    )
+
+
+def _lost(mast: MastInput) -> str:
+    parts = [
+        name for level in mast.levels or (mast,) for name in (level.speed, level.direction or mast.direction)
+    ]
+    return lost_of(mast.path, mast.separator, mast.time, dict.fromkeys(parts))
 
 
 def mast_levels(mast: MastInput, period_s: float) -> dict[float | None, PeriodMeans]:

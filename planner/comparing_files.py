@@ -68,6 +68,7 @@ def write_comparison(
 
 def _log(comparison: Comparison, title: str) -> str:
     lines = [title, f"means over {comparison.period_s:g} s against the mast"]
+    lines += [comparison.lost] if comparison.lost else []
     for row in comparison.rows:
         one = row.matched
         size = "" if one.sector_deg is None else f" {one.sector_deg:g}°"

@@ -1,5 +1,8 @@
 """A wind from a CSV: of a mast's cup and vane, or of a sonic."""
 
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -50,22 +53,44 @@ def read_sonic(sonic: SonicInput) -> WindSeries:
     InputError
         If the file lacks a column or holds fewer than two times.
     """
-    parts = (
-        (sonic.speed, sonic.direction)
-        if sonic.east is None or sonic.north is None
-        else (sonic.east, sonic.north)
-    )
+    parts = sonic_columns(sonic)
     frame = _frame(f"sonic '{sonic.name}'", sonic.path, sonic.separator, (sonic.time, *parts))
     one, other = (_numbers(frame[name], ()) for name in parts)
     u, v = uv_mps(one, other) if sonic.east is None else (one, other)
     return _series(_stamps(frame, f"sonic '{sonic.name}'", sonic.path, sonic.time), u, v)
 
 
-def _frame(what: str, path: str, separator: str, needed: tuple[str, ...]) -> "pd.DataFrame":
-    import pandas as pd
+def sonic_columns(sonic: SonicInput) -> tuple[str, str]:
+    """Columns of a sonic's wind: eastward and northward, or speed and direction."""
+    return (
+        (sonic.speed, sonic.direction)
+        if sonic.east is None or sonic.north is None
+        else (sonic.east, sonic.north)
+    )
 
+
+def lost_of(path: str, separator: str, time: str, parts: Iterable[str]) -> str:
+    """What of a wind's file cannot be used, in words; empty where all can.
+
+    Parameters
+    ----------
+    path, separator
+        A file that has been read.
+    time, parts
+        Its columns of times and of numbers.
+    """
+    frame = _frame("wind", path, separator, (time, *parts))
+    counts = {"rows without a time": int(_times(frame[time]).isna().sum())}
+    for name in parts:
+        wrong = frame[name].notna() & _as_numbers(frame[name]).isna()
+        counts[f"cells of {name} that are no number"] = int(wrong.sum())
+    lost = ", ".join(f"{what}: {count}" for what, count in counts.items() if count)
+    return f"lost of {Path(path).name}: {lost}" if lost else ""
+
+
+def _frame(what: str, path: str, separator: str, needed: tuple[str, ...]) -> "pd.DataFrame":
     try:
-        frame = pd.read_csv(path, sep=separator, skipinitialspace=True)
+        frame = _read(path, separator, Path(path).stat().st_mtime_ns)
     except (OSError, ValueError) as error:
         raise InputError(f"{what} file {path} cannot be read as CSV ({error})") from error
     if missing := [name for name in needed if name not in frame.columns]:
@@ -76,11 +101,27 @@ def _frame(what: str, path: str, separator: str, needed: tuple[str, ...]) -> "pd
     return frame
 
 
-def _stamps(frame: "pd.DataFrame", what: str, path: str, name: str) -> TimeArray:
+@lru_cache(maxsize=1)  # the levels of a mast stand in one file
+def _read(path: str, separator: str, written: int) -> "pd.DataFrame":  # noqa: ARG001 - a file that changed is another
     import pandas as pd
 
-    time = pd.to_datetime(frame[name], utc=True, errors="coerce", format="ISO8601")
-    stamps: TimeArray = time.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
+    return pd.read_csv(path, sep=separator, skipinitialspace=True)
+
+
+def _times(column: "pd.Series[str]") -> "pd.Series[pd.Timestamp]":
+    import pandas as pd
+
+    return pd.to_datetime(column, utc=True, errors="coerce", format="ISO8601")
+
+
+def _as_numbers(column: "pd.Series[float]") -> "pd.Series[float]":
+    import pandas as pd
+
+    return pd.to_numeric(column, errors="coerce")
+
+
+def _stamps(frame: "pd.DataFrame", what: str, path: str, name: str) -> TimeArray:
+    stamps: TimeArray = _times(frame[name]).dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
     if np.count_nonzero(~np.isnat(stamps)) < 2:
         raise InputError(
             f"{what} file {path} has fewer than two times in {name}: they have to be ISO 8601, UTC"
@@ -96,7 +137,5 @@ def _series(stamps: TimeArray, u: FloatArray, v: FloatArray) -> WindSeries:
 
 
 def _numbers(column: "pd.Series[float]", missing: tuple[float, ...]) -> FloatArray:
-    import pandas as pd
-
-    values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=float)
+    values = _as_numbers(column).to_numpy(dtype=float)
     return np.where(np.isin(values, missing), np.nan, values)

@@ -12,13 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.angles import circular_mean_deg
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import InputError
 from geometry.head import Mounting
 from planner.campaign import RayInput
 from planner.campaign_logs import Attitude
 from planner.places import Places
 from planner.scan_layout import ScanLayout
+from reconstruct.alignment import LONGEST_GAP
 from reconstruct.attitude import ATTITUDE, LogMeans, changes_from, log_means, pointing_angles, running_mean
 from reconstruct.averaging import TimeArray
 from reconstruct.records import Records
@@ -176,7 +177,7 @@ def _logged(records: Records, asked: Attitude) -> FloatArray:
 
 
 def _interpolated(time_utc: TimeArray, asked: Attitude) -> list[FloatArray]:
-    """The columns of a separate log at the times of rays; NaN before its beginning and after its end."""
+    """The columns of a separate log at the times of rays; NaN before its beginning, after its end and in its gaps."""
     stamps, logged, _ = _read_log(*_log_key(asked))
     ticks = time_utc.astype(np.int64).astype(float)
     found = []
@@ -185,9 +186,19 @@ def _interpolated(time_utc: TimeArray, asked: Attitude) -> list[FloatArray]:
         if not np.any(known):
             found.append(np.full(len(ticks), np.nan))
             continue
-        even = np.unwrap(column[known], period=360.0)
-        found.append(np.interp(ticks, stamps[known], even, left=np.nan, right=np.nan))
+        at, even = stamps[known], np.unwrap(column[known], period=360.0)
+        values = np.interp(ticks, at, even, left=np.nan, right=np.nan)
+        found.append(np.where(_in_gap(at, ticks), np.nan, values))
     return found
+
+
+def _in_gap(at: FloatArray, ticks: FloatArray) -> BoolArray:
+    """Which times (ray,) lie between two entries that are farther apart than a log's usual step allows."""
+    step = np.diff(at)
+    if not len(step):
+        return np.zeros(len(ticks), dtype=bool)
+    after = np.clip(np.searchsorted(at, ticks), 1, len(step))
+    return np.asarray((step[after - 1] > LONGEST_GAP * np.median(step)) & (ticks < at[after]))
 
 
 def _log_key(asked: Attitude) -> tuple[str, str, tuple[str, str, str], str, int]:

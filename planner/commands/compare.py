@@ -78,10 +78,12 @@ def compare(
     )
     if json:
         say_json(
-            {"rows": _documents(found), "verdicts": verdicts(found), "files": [str(path) for path in files]}
+            {"rows": _documents(found), "verdicts": verdicts(found), "lost": found.lost, "files": [str(path) for path in files]}
         )
         return
     _print(found)
+    if found.lost:
+        say(f"{found.lost}.")
     for line in verdicts(found):
         say(line[0].upper() + line[1:] + ".")
     remark(MEANING, quiet=quiet)

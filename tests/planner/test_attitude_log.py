@@ -159,6 +159,15 @@ def test_rows_of_a_log_that_say_nothing_are_counted(clean: Path) -> None:
     assert "lost: damaged.csv, rows without a time: 2, angles that are no number: 1" in found.notes["sector"]
 
 
+def test_rays_in_a_gap_of_a_log_are_counted(clean: Path) -> None:
+    """Forty entries, one a scan, are missing: the scans of them and what follows the entry before, 1200 + 29 rays."""
+    table = pd.read_csv(clean.parent / "log.csv", dtype=str).drop(index=range(20, 60))
+    table.to_csv(clean.parent / "gap.csv", index=False)
+    columns = f"path: {clean.parent / 'gap.csv'}, time: when, heading: Yaw, pitch: Tilt"
+    found, _ = run(clean, f"attitude: {{{columns}, factors: {{pitch_deg: -1}}}}")
+    assert found.drifts["sector"].unlogged == 1229 + 29  # and the rays after the last entry
+
+
 def test_the_reference_of_the_log_may_be_given(clean: Path) -> None:
     """A compass that showed half a degree less while targets were mapped: all rays turn by as much."""
     _, error = run(clean, f"attitude: {{reference: {{heading_deg: {COMPASS - 0.5}}}}}")
