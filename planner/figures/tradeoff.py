@@ -50,7 +50,7 @@ def _panel(axes: "Axes", rows: Sequence[Trade]) -> None:
             markersize=13 if reference else 8,
             color=LIDARS[index % len(LIDARS)],
             linestyle="none",
-            label=trade.method + (" (reference)" if reference else ""),
+            label=trade.method + (" (reference: distance 0)" if reference else ""),
         )
     noise = next((trade.standard_error for trade in rows if trade.standard_error), None)
     if noise:
