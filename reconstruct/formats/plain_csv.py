@@ -137,6 +137,10 @@ def _records(table: "pd.DataFrame", options: Options, where: str) -> Records:
     time: TimeArray = stamps + seconds_delta(half + options.clock_offset_s)
     if np.any(half):
         notes.append(f"times turned from the {options.stamp} to the middle of the ray; angles as stored")
+    if options.stamp in ("start", "end") and (unknown := int(np.count_nonzero(~np.isfinite(duration)))):
+        notes.append(
+            f"{unknown} of {rays} rays have no duration_s: their times stay at the {options.stamp} of the ray"
+        )
     own_sweeps = (
         first["sweep_id"].to_numpy(dtype=np.intp) if "sweep_id" in first else sweep_ids(azimuth, elevation)
     )

@@ -320,6 +320,10 @@ def test_a_column_map_turns_any_csv_into_rays(tmp_path):
     np.testing.assert_allclose(records.radial_speed_mps[0], [-3.25, -4.25])
     np.testing.assert_allclose(records.cnr_db[0], [-10, np.nan])
     assert sum(loss.times for loss in records.losses) == 1
+    unknown = Options(columns=replace(columns, constants={}), stamp="end")
+    kept = read(path, kind="csv", options=unknown)
+    assert str(kept.time_utc[0]) == "2014-04-30T00:00:00.000000000"
+    assert "4 of 4 rays have no duration_s: their times stay at the end of the ray" in kept.notes
     with pytest.raises(InputError, match="no column for cnr_db"):
         read(
             path, kind="csv", options=Options(columns=replace(columns, names={**names, "cnr_db": "nothing"}))
