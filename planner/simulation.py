@@ -73,10 +73,6 @@ class Virtual:
     scans: tuple[VirtualScan, ...]
     periods_s: float = 600.0
 
-    def as_planned(self, scan: str) -> ScanLayout:
-        """The layout of one of the scans."""
-        return next(layout for layout in self.layouts if layout.name == scan)
-
 
 def virtual(plan: Plan, options: Options) -> Virtual:
     """Prepare a virtual campaign of all scans that measure wind at a target.

@@ -108,39 +108,15 @@ def factorise(
     return Factor(basis, spread, condition, short)
 
 
-def orthogonalise(columns: Sequence[FloatArray]) -> tuple[tuple[FloatArray, ...], FloatArray]:
-    """Modified Gram-Schmidt with scaled columns, each pass made again where it takes much of a column away.
-
-    "Twice is enough" to be orthogonal to rounding: shown for the classical form, the worse one, by Giraud et al. (2005),
-    Numer. Math. 101, 87-100, doi:10.1007/s00211-005-0615-4.
-
-    Parameters
-    ----------
-    columns : sequence of numpy.ndarray
-        Each (ray, ...).
-
-    Returns
-    -------
-    basis : tuple of numpy.ndarray
-        Orthonormal columns (ray, ...); zeros for a column of zeros.
-    triangle : numpy.ndarray
-        (col, col, ...) upper triangular, columns = basis @ triangle.
-
-    Examples
-    --------
-    >>> basis, triangle = orthogonalise([np.array([3.0, 4.0]), np.array([1.0, 0.0])])
-    >>> triangle.round(3)
-    array([[5. , 0.6],
-           [0. , 0.8]])
-    """
-    own = [np.array(column) for column in np.broadcast_arrays(*columns)]
-    return _orthogonalise(own, np.empty_like(own[0]))
-
-
 def _orthogonalise(
     columns: list[FloatArray], scratch: FloatArray
 ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-    """Turn columns into their basis in place: fresh memory costs more than the arithmetic in it."""
+    """Turn columns (ray, ...) into an orthonormal basis in place, and give the triangle (col, col, ...) that they were.
+
+    In place, because fresh memory costs more than the arithmetic in it. Modified Gram-Schmidt, each pass made again
+    where it takes much of a column away: "twice is enough" to be orthogonal to rounding is shown for the classical form,
+    the worse one, by Giraud et al. (2005), Numer. Math. 101, 87-100, doi:10.1007/s00211-005-0615-4.
+    """
     triangle = np.zeros((len(columns), len(columns), *columns[0].shape[1:]))
     for k, rest in enumerate(columns):
         scale = _normalise(rest)

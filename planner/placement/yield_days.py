@@ -108,28 +108,6 @@ def expected_yield(
     return Yield(edges, np.linspace(0.0, 360.0, count + 1), share * periods * availability, periods)
 
 
-def days_needed(one_day: Yield, *, least_per_bin: float, wanted: ArrayLike | None = None) -> float:
-    """How many days it takes until every wanted bin is expected to hold enough values.
-
-    Parameters
-    ----------
-    one_day
-        The yield of one day.
-    least_per_bin
-        Values that each wanted bin has to hold.
-    wanted
-        (speed, direction) True for bins that count; default: those with any wind.
-
-    Returns
-    -------
-    float
-        Days; inf where a wanted bin never fills.
-    """
-    counted = one_day.expected > 0 if wanted is None else np.asarray(wanted, dtype=bool)
-    least = float(np.min(one_day.expected[counted], initial=np.inf))
-    return least_per_bin / least if least > 0 else float("inf")
-
-
 def _speed_shares(site: Site, cell: SectorSet, edges: FloatArray) -> FloatArray:
     """(speed,) share of all wind that comes from some directions at the speeds of each bin."""
     wind = site.assumed_wind

@@ -10,7 +10,7 @@ from planner.placement.echo import echo
 from planner.placement.maps import of_lidar
 from planner.placement.sharing import shared
 from planner.placement.task import task_of
-from planner.placement.yield_days import days_needed, expected_yield
+from planner.placement.yield_days import expected_yield
 from planner.places import Places
 from planner.scan_layout import lay_out
 from planner.signal_noise import ray_noise
@@ -54,13 +54,6 @@ def test_directions_lost_to_wakes_are_not_counted():
     halved = expected_yield(site_with(), 10.0, excluded=SectorSet.of([Sector(0.0, 180.0)]), availability=0.5)
     assert halved.expected.sum() == pytest.approx(free.expected.sum() / 4)
     assert np.all(halved.expected[:, :6] == 0.0)
-
-
-def test_days_needed_fill_the_emptiest_wanted_bin():
-    day = expected_yield(site_with(), 1.0, speed_edges_mps=[4.0, 8.0, 12.0])
-    days = days_needed(day, least_per_bin=3.0)
-    longer = expected_yield(site_with(), days, speed_edges_mps=[4.0, 8.0, 12.0])
-    assert longer.expected.min() == pytest.approx(3.0)
 
 
 def test_wind_without_a_distribution_is_said():
