@@ -17,7 +17,7 @@ KINDS = ("error", "warning", "remark")  # in the order of planner.finding.SEVERI
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("check")(check)
+    app.command("check", short_help="Findings about the plan.")(check)
 
 
 def check(

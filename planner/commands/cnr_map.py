@@ -49,6 +49,7 @@ def register(app: typer.Typer) -> None:
     group = typer.Typer(
         name="cnr-map",
         help="CNR maps of hard targets: plan them, rehearse them, and fit offsets to them.",
+        short_help="CNR maps of hard targets: plan, rehearse, fit, level.",
         no_args_is_help=True,
     )
     group.command("plan")(plan)

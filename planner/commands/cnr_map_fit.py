@@ -126,7 +126,7 @@ def level(
     result = level_head(
         load_plan(site).exact_places,
         lidar,
-        [read(path) for path in scans],
+        [(path, read(path)) for path in scans],
         sea_height_m=sea_height,
         sea_std_m=sea_std,
         solve_offset=solve_offset,

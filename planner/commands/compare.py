@@ -46,7 +46,7 @@ MEANING = (
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("compare")(compare)
+    app.command("compare", short_help="Regression against the mast, beside the prediction.")(compare)
 
 
 def compare(
@@ -78,7 +78,12 @@ def compare(
     )
     if json:
         say_json(
-            {"rows": _documents(found), "verdicts": verdicts(found), "lost": found.lost, "files": [str(path) for path in files]}
+            {
+                "rows": _documents(found),
+                "verdicts": verdicts(found),
+                "lost": found.lost,
+                "files": [str(path) for path in files],
+            }
         )
         return
     _print(found)

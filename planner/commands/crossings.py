@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("crossings")(crossings)
+    app.command("crossings", short_help="Opening angles, and how near the beams of pairs come.")(crossings)
 
 
 def crossings(site: SiteArgument, json: JsonOption = False, quiet: QuietOption = False) -> None:

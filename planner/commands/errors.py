@@ -58,7 +58,7 @@ TIERS: tuple["Tier", ...] = ("noise", "linear", "turbulent", "monte-carlo")
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("errors")(errors)
+    app.command("errors", short_help="Predicted error per sector size, and the size to take.")(errors)
 
 
 def errors(

@@ -48,7 +48,7 @@ GatesOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("export")(export)
+    app.command("export", short_help="Maps, tables, instruments' files and field sheets.")(export)
 
 
 def export(

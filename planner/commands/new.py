@@ -35,7 +35,7 @@ NameOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("new")(new)
+    app.command("new", short_help="Write a site file to start from.")(new)
 
 
 def new(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("place")(place)
+    app.command("place", short_help="Where to put lidars, ranked, with maps.")(place)
 
 
 def place(

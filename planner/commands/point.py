@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("point")(point)
+    app.command("point", short_help="Azimuth, elevation, range and gate per lidar and target.")(point)
 
 
 def point(site: SiteArgument, json: JsonOption = False, quiet: QuietOption = False) -> None:

@@ -34,7 +34,7 @@ TradeoffOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("report")(report)
+    app.command("report", short_help="All of it in one self-contained page.")(report)
 
 
 def report(

@@ -26,7 +26,7 @@ InteractiveOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("retrieve")(retrieve)
+    app.command("retrieve", short_help="Measured rays to wind of scans and of 1 and 10 minutes.")(retrieve)
 
 
 def retrieve(

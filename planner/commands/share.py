@@ -24,7 +24,7 @@ TargetsOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("share")(share)
+    app.command("share", short_help="Several heights or targets for the same lidars.")(share)
 
 
 def share(

@@ -43,7 +43,7 @@ CellOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("simulate")(simulate)
+    app.command("simulate", short_help="A virtual campaign, written as measured rays.")(simulate)
 
 
 def simulate(
@@ -81,9 +81,12 @@ def simulate(
     require_folder(out)
     plan = load_plan(site, fidelity)
     options = Options(days=days, seed=seed, lost_share=lost, settings=VirtualSettings(spacing_m=cell_m))
-    text = Path(site).read_text(encoding="utf-8-sig")
+    path = Path(site)
+    text = path.read_text(encoding="utf-8-sig")
     with shown("flying the campaign", quiet=quiet) as progress:
-        files = write_virtual(plan, text, out, options=options, kind=form, url=url, progress=progress)
+        files = write_virtual(
+            plan, text, out, options=options, beside=path.parent, kind=form, url=url, progress=progress
+        )
     if json:
         say_json({"campaign": str(files[0]), "files": [str(path) for path in files[1:]]})
     else:

@@ -37,7 +37,7 @@ LONGEST_DAYS = 3650.0  # nobody stays longer
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("stay")(stay)
+    app.command("stay", short_help="Ten-minute values to expect, and how long to stay.")(stay)
 
 
 def stay(

@@ -30,7 +30,7 @@ AccumulationOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("tour")(tour)
+    app.command("tour", short_help="Fastest order of a step-stare tour.")(tour)
 
 
 def tour(

@@ -19,7 +19,7 @@ SeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Sta
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("tradeoff")(tradeoff)
+    app.command("tradeoff", short_help="What accuracy costs on this machine.")(tradeoff)
 
 
 def tradeoff(

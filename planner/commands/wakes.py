@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("wakes")(wakes)
+    app.command("wakes", short_help="Wind directions that are free of wakes.")(wakes)
 
 
 def wakes(
