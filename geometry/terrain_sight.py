@@ -24,6 +24,7 @@ class TerrainSight(NamedTuple):
     blocked: BoolArray  # (..., gate) the ground is in the way
     unknown: BoolArray  # (..., gate) not blocked as far as is known, but part of the way has no height
     entry_m: FloatArray  # (..., gate) level distance from the head where it first meets the ground; NaN if it does not
+    pass_m: FloatArray  # (..., gate) height above the ground where, up to the gate, it passes it nearest as seen from the head
 
 
 class Pass(NamedTuple):
@@ -138,10 +139,10 @@ def terrain_sight(
     step = max(CHUNK // max(int(np.sum(_cells_crossed(raster, head, end)).max(initial=1)), 1), 1)
     slices = [slice(start, start + step) for start in range(0, max(len(head), 1), step)]
     parts = [_sight(raster, head[part], end[part], gates, refraction) for part in slices]
-    joined = (np.concatenate([part[i] for part in parts]).reshape(*shape, gates.size) for i in range(4))
-    least, where, complete, entry = joined
+    joined = (np.concatenate([part[i] for part in parts]).reshape(*shape, gates.size) for i in range(5))
+    least, where, complete, entry, passed = joined
     blocked = np.asarray(least < 0.0)
-    return TerrainSight(least, where, blocked, ~blocked & ~complete.astype(bool), entry)
+    return TerrainSight(least, where, blocked, ~blocked & ~complete.astype(bool), entry, passed)
 
 
 def nearest_pass(
@@ -177,28 +178,37 @@ def nearest_pass(
         raster, head.reshape(-1, 3), end.reshape(-1, 3), np.ones(1), refraction
     )
     distance = share * span[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = np.where(np.isnan(above), np.inf, above / distance)
+    slope = _slope(above, distance)
     nearest = np.argmin(slope, axis=1)[:, None]
     clear, where = (np.take_along_axis(values, nearest, axis=1)[:, 0] for values in (above, distance))
     return Pass(clear.reshape(shape), np.where(np.isnan(clear), np.nan, where).reshape(shape))
 
 
+def _slope(above: FloatArray, distance: FloatArray) -> FloatArray:
+    """How steeply the ground lies below samples of beams, as seen from the head: tangents; inf where it is not known."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = above / distance  # a head on the ground itself: 0/0
+    return np.where(np.isnan(slope), np.inf, slope)
+
+
 def _sight(
     raster: HeightRaster, head: FloatArray, end: FloatArray, gates: FloatArray, refraction: float
-) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    """Least clearance, where, whether every height is known, and where the ground is met: (beam, gate) each."""
+) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray, FloatArray]:
+    """Least clearance, where, whether every height is known, where the ground is met, nearest pass: (beam, gate) each."""
     share, above, span = _heights_above(raster, head, end, gates, refraction)
     entry = span * _first_below(share, above)
-    least, where, complete = (np.empty((len(head), gates.size)) for _ in range(3))
+    least, where, complete, passed = (np.empty((len(head), gates.size)) for _ in range(4))
+    slope = _slope(above, share * span[:, None])
     for number, gate in enumerate(gates):
         upto = np.where((share <= gate) & ~np.isnan(above), above, np.inf)
         lowest = np.argmin(upto, axis=1)[:, None]
         least[:, number] = np.take_along_axis(upto, lowest, axis=1)[:, 0]
         where[:, number] = span * np.take_along_axis(share, lowest, axis=1)[:, 0]
         complete[:, number] = ~np.any((share <= gate) & np.isnan(above), axis=1)
+        nearest = np.argmin(np.where(share <= gate, slope, np.inf), axis=1)[:, None]
+        passed[:, number] = np.take_along_axis(above, nearest, axis=1)[:, 0]
     met = np.where(least < 0.0, entry[:, None], np.nan)
-    return np.where(np.isinf(least), np.nan, least), where, complete.astype(bool), met
+    return np.where(np.isinf(least), np.nan, least), where, complete.astype(bool), met, passed
 
 
 def _heights_above(

@@ -20,6 +20,7 @@ from planner.analysis_files import (
     Retrieved,
     append_fast,
     file_name,
+    require_own_files,
     write_fast_parquet,
     write_log,
     write_means,
@@ -37,6 +38,7 @@ from planner.pair_retrieval import kept_series, partners_of, retrieve_pair
 from planner.plan import Plan
 from planner.pointing_log import NOTHING_KNOWN, Known, Pointed, pointed, require_log
 from planner.ray_files import Part, gate_of, parts_of
+from planner.result_mark import write_mark
 from planner.scan_jobs import ScanJob, jobs_of
 from planner.scan_retrieval import add_steps, empty_part, retrieve_part
 from planner.sum_files import Key, SumFiles
@@ -112,6 +114,7 @@ def retrieve(loaded: Loaded, *, restart: bool = False, progress: Progress | None
             resumed=sum(each.resumed for each in merged.values()),
         )
         write_fast_parquet(folder)
+        write_mark(folder, loaded)
         write_log(folder, (campaign.name, loaded.site.name), found)
     shutil.rmtree(campaign.output / WORK, ignore_errors=True)
     _tell(progress, 1.0)
@@ -132,6 +135,8 @@ class _Run:
     def of(cls, campaign: Campaign, plan: Plan, work: Path) -> "_Run":
         todo = _jobs(campaign, plan)
         jobs = {job.name: job for _, job in todo}
+        require_own_files([*jobs, *(pair.pair for pair in campaign.pairs)])
+        require_own_files(sonic.name for sonic in campaign.sonics)
         names = {name for pair in campaign.pairs for name in partners_of(pair, plan, jobs)}
         return cls(campaign, plan, work, todo, frozenset(name for name in names if jobs[name].kind != "fan"))
 

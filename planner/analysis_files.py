@@ -1,13 +1,14 @@
 """The files of a run of the analysis: winds of single scans, period means, and the log."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.errors import InputError
 from planner.attitude_files import Logged, told_drifts
 from planner.campaign import CNR_DB, Campaign
 from planner.clocks import ClockLag, SonicTrim, told_clock, told_trims
@@ -71,6 +72,31 @@ def file_name(scan: str) -> str:
     'stare_K_1'
     """
     return "".join(letter if letter.isalnum() or letter in "-." else "_" for letter in scan)
+
+
+def require_own_files(names: Iterable[str]) -> None:
+    """Refuse names of results that files cannot keep apart, small and capital letters taken for the same.
+
+    Raises
+    ------
+    InputError
+        If two of them would share a file.
+
+    Examples
+    --------
+    >>> require_own_files(["s t", "s_t"])
+    Traceback (most recent call last):
+    geometry.errors.InputError: 's t' and 's_t' would share the file s_t: rename one of them in the site file
+    """
+    known: dict[str, str] = {}
+    for name in names:
+        file = file_name(name)
+        first = known.get(file.casefold())
+        if first is not None:
+            raise InputError(
+                f"'{first}' and '{name}' would share the file {file}: rename one of them in the site file"
+            )
+        known[file.casefold()] = name
 
 
 def append_fast(folder: Path, scan: str, fast: Mapping[str, FloatArray | TimeArray]) -> None:

@@ -15,7 +15,7 @@ from reconstruct.persistence import split_covariance
 from reconstruct.ray_fit import ray_fit
 from reconstruct.rays import Rays
 from reconstruct.ten_minute import predict_ten_minute
-from reconstruct.uncertainty import BudgetEntry, ErrorSources, budget, unknown_sources
+from reconstruct.uncertainty import REFERENCE, BudgetEntry, ErrorSources, budget, unknown_sources
 from reconstruct.wind import WindState
 
 # Names of the fields of ErrorSources in words, in the order of the table.
@@ -32,7 +32,6 @@ SOURCES = {
 TURBULENCE = "turbulence between scan and target"
 CLOCK = "clock of the lidar"  # what it adds to that
 NOT_DECLARED = "the site declares no turbulence"
-REFERENCE = "reference instrument"
 NO_REFERENCE = "the mast's speed_uncertainty_mps and direction_uncertainty_deg are not declared"
 
 

@@ -1,5 +1,6 @@
 """A CNR map planned: where to scan for a hard target, in which steps and gates, how long, and what else is there."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,13 @@ from planner.places import Places
 from planner.site import HardTarget, Lidar
 from planner.target_ground import GroundMet, ground_met
 from reconstruct.hard_target import BEAM_WIDTH_M
+from reconstruct.sightings import Angle, solvable
 from reconstruct.target_choice import Choice, best_targets
 
 DEFAULT_ACCUMULATION_S = 0.1
+LONG_MAP_S = (
+    1800.0  # from here on it is said what makes a map long: light and head change in an hour, ASSUMED
+)
 GATE_M = 1.0
 
 
@@ -111,6 +116,8 @@ def plan_map(
         notes.append(
             "part of the way to it lies outside the height raster: whether the terrain hides it is not known"
         )
+    if stages[-1].time_s > LONG_MAP_S:
+        notes.append(_why_long(stages[-1]))
     ground = ground_met(places, chosen, *stages[-1].rays, gates.last_m + 0.5 * probe.length_m)
     return MapPlan(
         lidar=chosen,
@@ -136,6 +143,28 @@ def choose_targets(places: Places, lidar: str, *, count: int = 3) -> Choice | No
         return None
     return best_targets(
         found, count=count, start=places.mounting(chosen), head_std_m=chosen.uncertainty.position_m
+    )
+
+
+def solvable_angles(places: Places, lidar: str, names: Sequence[str]) -> tuple[Angle, ...]:
+    """The angles that these of the hard targets in sight determine together; `--solve` of a fit."""
+    chosen = places.site.lidar(lidar)
+    seen = [item for item in candidates(places, chosen) if item.name in names]
+    return solvable(seen, start=places.mounting(chosen), head_std_m=chosen.uncertainty.position_m)
+
+
+def _why_long(window: Window) -> str:
+    """What makes a map long, and what shortens it."""
+    across, upward = (0.5 * float(np.ptp(line)) for line in (window.azimuth_deg, window.elevation_deg))
+    rays, step = (
+        window.azimuth_deg.size * window.elevation_deg.size,
+        float(np.diff(window.elevation_deg[:2])[0]),
+    )
+    return (
+        f"{window.time_s / 60:.0f} min for {rays:,} rays, since a window of ±{across:.2f}° by ±{upward:.2f}°, where it may be, "
+        f"is scanned in steps of {step:.4f}°, as the target is thin and the beam narrow there. Coarser steps need a target "
+        "that is thicker or nearer; a narrower window needs a heading that is known better (--heading-std) and smaller "
+        "uncertainties of levelling, elevation and position in the site file"
     )
 
 

@@ -14,6 +14,8 @@ from planner.error_nouns import SizeError
 from planner.files.yaml_campaign import Loaded
 from planner.mast_file import lost_of, read_mast
 from planner.plan import Plan
+from planner.ray_sets import subset_of
+from planner.result_mark import require_own_results
 from planner.scan_jobs import job_name
 from reconstruct.agreement import Difference, set_beside
 from reconstruct.averaging import PeriodMeans, TimeArray, period_means
@@ -39,6 +41,7 @@ class Matched:
 
     scan: str
     sector_deg: float | None  # None for a pair
+    rays: int  # of one wind: those of the sector, or one of each scan of a pair
     height_m: float | None  # of what the lidar measures, above the ground
     mast_height_m: float | None  # of the mast's level; None where the campaign does not say
     time_utc: TimeArray  # (period,) ends
@@ -117,7 +120,7 @@ def compare(loaded: Loaded, *, tier: Tier | None = None, predict: bool = True) -
         raise InputError(
             "the campaign has no mast: give `mast: {path: ...}` with a CSV of its speed and direction"
         )
-    plan, table = Plan(loaded.site), _means_table(campaign)
+    plan, table = Plan(loaded.site), _means_table(loaded)
     levels = mast_levels(campaign.mast, campaign.averaging.compare_s)
     matched = matches(table, levels, plan, campaign)
     predicted = (
@@ -211,6 +214,7 @@ def matches(
             Matched(
                 scan=str(scan),
                 sector_deg=size,
+                rays=_rays(plan, str(scan), size),
                 height_m=None if np.isnan(height_m) else height_m,
                 mast_height_m=level_m,
                 time_utc=shared[kept],
@@ -239,12 +243,14 @@ def nearest_level(levels: Mapping[float | None, PeriodMeans], height_m: float) -
     return max(known) if np.isnan(height_m) else min(known, key=lambda level: abs(level - height_m))
 
 
-def _means_table(campaign: Campaign) -> "pd.DataFrame":
+def _means_table(loaded: Loaded) -> "pd.DataFrame":
     import pandas as pd
 
+    campaign = loaded.campaign
     path = campaign.output / f"means_{campaign.averaging.compare_s:g}s.csv"
     if not path.is_file():
         raise InputError(f"{path} is not there: run `lidarplan retrieve` first")
+    require_own_results(loaded)
     return pd.read_csv(path, parse_dates=["time_utc"], date_format="ISO8601")
 
 
@@ -284,6 +290,16 @@ def _scans_behind(plan: Plan, result: str) -> set[str]:
     """Scans of the site that a result was made of; one of several points or gates is named after its scan."""
     own = {name for name in plan.layout if result == name or result.startswith(job_name(name, ""))}
     return own or set(plan.site.pair(result).scans)
+
+
+def _rays(plan: Plan, result: str, sector_deg: float | None) -> int:
+    """How many rays one wind of a result is made of."""
+    scans = _scans_behind(plan, result)
+    if sector_deg is None:
+        return len(scans)
+    layout = plan.layout[scans.pop()]
+    part = slice(None) if layout.spec.type != "sector" else subset_of(layout, sector_deg)
+    return len(layout.scan.azimuth_deg[part])
 
 
 def _predictions(

@@ -28,7 +28,7 @@ def table_rows(comparison: Comparison) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for row in comparison.rows:
         one = row.matched
-        told: dict[str, object] = {"scan": one.scan, "sector_deg": one.sector_deg}
+        told: dict[str, object] = {"scan": one.scan, "sector_deg": one.sector_deg, "rays": one.rays}
         told |= {"height_m": one.height_m, "mast_height_m": one.mast_height_m}
         told |= row.speed._asdict()
         told |= {

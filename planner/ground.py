@@ -12,6 +12,9 @@ from geometry.frames import HeightDatum
 from geometry.terrain import HeightRaster
 from planner.site import Site, Terrain
 
+# Copernicus DEM GLO-30: absolute vertical accuracy better than 4 m at 90 % (product handbook).
+RASTER_ACCURACY_M = 4.0
+
 Stamps = tuple[int, ...]  # when the files were last written: a raster that has changed is read again
 
 
@@ -56,6 +59,27 @@ def ground_under_m(site: Site, positions_m: ArrayLike) -> FloatArray:
     return heights.ground.heights_m(positions[..., 0], positions[..., 1])
 
 
+def ground_doubt_m(raster: HeightRaster, positions_m: ArrayLike) -> FloatArray:
+    """How far the real ground may be from a raster's surface under positions (..., 2 or more) [m]; NaN where not known.
+
+    The accuracy of a good raster, 4 m, and half the difference of the highest and lowest of the four cells around: as much
+    as the surface changes over half a cell, within which a raster says nothing.
+
+    Examples
+    --------
+    >>> slope = HeightRaster(np.array([[0.0, 10.0], [0.0, 10.0]]), 0.0, 200.0, 100.0, 100.0, "above_sea_level")
+    >>> ground_doubt_m(slope, [[100.0, 100.0]]).tolist()
+    [9.0]
+    """
+    positions = np.asarray(positions_m, dtype=np.float64)
+    aside = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]])
+    corners = positions[..., None, :2] + aside * (raster.cell_east_m, raster.cell_north_m)
+    west, south, east, north = raster.bounds_m
+    inside = np.clip(corners, (west, south), (east, north))
+    heights = raster.heights_m(inside[..., 0], inside[..., 1])
+    return np.asarray(RASTER_ACCURACY_M + np.ptp(heights, axis=-1) / 2)
+
+
 def refuse_unknown(raster: HeightRaster, targets_m: Mapping[str, ArrayLike]) -> None:
     """Refuse targets under which a raster has no height.
 
@@ -81,7 +105,7 @@ def refuse_unknown(raster: HeightRaster, targets_m: Mapping[str, ArrayLike]) -> 
         raise InputError(
             f"the height of the ground under target{'s' if len(names) > 1 else ''} {', '.join(names)} is not known: outside "
             f"the height raster (easting {west:.0f} to {right:.0f}, northing {south:.0f} to {top:.0f}) or in a hole of it; "
-            "give a raster that holds the targets"
+            "give a raster that holds the targets, and check `crs`: with the wrong UTM zone everything stands elsewhere"
         )
 
 

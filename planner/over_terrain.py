@@ -9,8 +9,8 @@ import numpy as np
 from geometry.arrays import ArrayLike, BoolArray, FloatArray
 from geometry.beams import unit_vector
 from geometry.earth import refraction_lift_m
-from geometry.terrain_sight import TerrainSight, nearest_pass, terrain_sight
-from planner.ground import Heights, heights_of
+from geometry.terrain_sight import nearest_pass, terrain_sight
+from planner.ground import Heights, ground_doubt_m, heights_of
 from planner.obstruction import Obstruction, margin_m, reach_m
 from planner.places import Places
 from planner.scan_layout import ScanLayout
@@ -38,7 +38,10 @@ class OverTerrain:
 
     scan: str
     range_m: FloatArray  # (ray, gate) slant ranges: the gates, and how far the ray is wanted
-    clearance_m: FloatArray  # (ray, gate) least height above the ground from the head to there
+    clearance_m: (
+        FloatArray  # (ray, gate) least height above the ground from the head to there, the head's own counted
+    )
+    pass_m: FloatArray  # (ray, gate) height above the ground where, up to there, it is nearest as seen from the head
     blocked: BoolArray  # (ray, gate)
     unknown: BoolArray  # (ray, gate) part of the way has no height, and what is known of it is clear
     wanted: int  # index of the gate that stands for how far the rays are wanted
@@ -116,10 +119,15 @@ def _obstruction(layout: ScanLayout, sight: OverTerrain) -> Obstruction:
 
 
 def standing_head_m(heights: Heights, lidar: Lidar) -> FloatArray:
-    """Where a lidar's head is (3,), easting, northing, height [m]: one that is declared below the ground stands on it."""
+    """Where a lidar's head is (3,), easting, northing, height [m].
+
+    One that is declared below the ground by no more than the raster's own doubt stands on it. One farther below stays
+    there, in the ground, which blocks all its beams.
+    """
     east, north, height = lidar.position
     ground = float(heights.ground.heights_m(east, north))
-    return np.array([east, north, max(height, ground) if np.isfinite(ground) else height])
+    buried = ground - height > ground_doubt_m(heights.ground, lidar.position)
+    return np.array([east, north, height if buried or not np.isfinite(ground) else max(height, ground)])
 
 
 def beam_ends_m(
@@ -167,7 +175,8 @@ def _of_scan(places: Places, layout: ScanLayout, heights: Heights) -> OverTerrai
     return OverTerrain(
         scan=layout.name,
         range_m=reach[:, None] * shares,
-        clearance_m=_least(sight),
+        clearance_m=_least(sight.clearance_m),
+        pass_m=_least(sight.pass_m),
         blocked=blocked,
         unknown=np.asarray(~blocked & sight.unknown.any(axis=1)),
         wanted=at,
@@ -194,9 +203,9 @@ def _ends_m(places: Places, layout: ScanLayout, reach: FloatArray, cell_m: float
     return beam_ends_m(places, layout.lidar, azimuth, lowest[:, None] + 0.0 * turn, reach[:, None])
 
 
-def _least(sight: TerrainSight) -> FloatArray:
-    """(ray, gate) least clearance of the beams (ray, beam, gate) of a ray; NaN where none is known."""
-    least = np.min(np.where(np.isnan(sight.clearance_m), np.inf, sight.clearance_m), axis=1)
+def _least(clearance_m: FloatArray) -> FloatArray:
+    """(ray, gate) least of the beams (ray, beam, gate) of a ray; NaN where none is known."""
+    least = np.min(np.where(np.isnan(clearance_m), np.inf, clearance_m), axis=1)
     return np.where(np.isinf(least), np.nan, least)
 
 

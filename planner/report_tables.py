@@ -59,7 +59,7 @@ TERRAIN = (
     Column("elevation_deg", "elevation", "°", 3),
     Column("range_m", "range", "m", 1),
     Column("terrain", "terrain"),
-    Column("clearance_m", "least height above it on the way", "m", 2),
+    Column("clearance_m", "height above it where it passes nearest, as seen from the head", "m", 2),
 )
 
 CROSSINGS = (
@@ -174,7 +174,11 @@ def pointing_table(plan: Plan) -> Table:
 
 
 def terrain_table(plan: Plan) -> Table:
-    """Every ray and gate over the terrain: blocked, clear or unknown, and its clearance; empty without a terrain."""
+    """Every ray and gate over the terrain: blocked, clear or unknown, and its clearance; empty without a terrain.
+
+    The clearance is that of `lidarplan point`, up to each gate: where the beam passes the ground at the smallest angle as
+    seen from the head. Plain height would be that of the head above its own ground at nearly every gate.
+    """
     rows = tuple(row for sight in plan.over_terrain for row in _terrain_rows(plan, sight))
     return Table("terrain", "Every ray and gate over the terrain", TERRAIN, rows)
 
@@ -183,7 +187,7 @@ def _terrain_rows(plan: Plan, sight: OverTerrain) -> Iterator[tuple[Value, ...]]
     scan = plan.layout[sight.scan].scan
     for ray, gate in np.ndindex(*sight.blocked.shape):
         blocked, unknown = sight.blocked[ray, gate], sight.unknown[ray, gate]
-        clearance_m = float(sight.clearance_m[ray, gate])
+        clearance_m = float(sight.pass_m[ray, gate])
         yield (
             *(sight.scan, int(ray) + 1, float(scan.azimuth_deg[ray]), float(scan.elevation_deg[ray])),
             float(sight.range_m[ray, gate]),

@@ -10,9 +10,9 @@ from geometry.errors import InputError
 from geometry.head import Mounting
 from planner.places import Places
 from planner.site import Lidar, Site
-from reconstruct.range_fit import edge_range
+from reconstruct.range_fit import EDGE_GATES, edge_range
 from reconstruct.records import Records
-from reconstruct.sea_level import Level, level_from_sea
+from reconstruct.sea_level import SEEN_RADIUS_M, Level, level_from_sea, sea_range_m
 
 # Tide, swell and the foot of the waves: how well the height of the sea is taken to be known (k = 1), ASSUMED.
 SEA_STD_M = 0.1
@@ -23,6 +23,7 @@ class SeaFit(NamedTuple):
 
     lidar: Lidar
     before: Mounting
+    height_m: float  # of the head above the sea of the moment, as stated
     level: Level
     rays: int  # all that came; `level.rays` of them met the sea
     offset_solved: bool
@@ -31,7 +32,7 @@ class SeaFit(NamedTuple):
 def level_head(
     places: Places,
     lidar: str,
-    scans: Sequence[Records],
+    scans: Sequence[tuple[str, Records]],
     *,
     sea_height_m: float = 0.0,
     sea_std_m: float = SEA_STD_M,
@@ -43,8 +44,8 @@ def level_head(
     ----------
     places, lidar
         The site, and the name of the lidar that measured.
-    scans : sequence of Records
-        Rays with CNR in the head's own angles, at bearings over water.
+    scans : sequence of (file, Records)
+        Rays with CNR in the head's own angles, at bearings over water; the file is for messages.
     sea_height_m, sea_std_m : float
         The sea of the moment above mean sea level (tide) and its standard deviation [m].
     solve_offset : bool
@@ -53,7 +54,8 @@ def level_head(
     Raises
     ------
     InputError
-        If too few rays meet the sea, they do not determine the tilt, or the head is not above the sea.
+        If a scan cannot show the sea or too few rays meet it, they do not determine the tilt (the files are named),
+        or the head is not above the sea.
 
     Notes
     -----
@@ -68,17 +70,21 @@ def level_head(
             f"{lidar} stands {height_m:.2f} m above the sea of the moment; needed: more than 0. Check its height in the "
             "site file and --sea-height"
         )
-    azimuth, elevation, met, std = _met(scans)
-    level = level_from_sea(
-        azimuth + before.azimuth_offset_deg,
-        elevation + before.elevation_offset_deg,
-        before.true_range_m(met),
-        range_std_m=std,
-        height_m=height_m,
-        height_std_m=float(np.hypot(sea_std_m, chosen.uncertainty.position_m)),
-        solve_offset=solve_offset,
-    )
-    return SeaFit(chosen, before, level, int(met.size), solve_offset)
+    edges = [_met(name, scan, before, height_m) for name, scan in scans]
+    azimuth, elevation, met, std = (np.concatenate(parts) for parts in zip(*edges, strict=True))
+    try:
+        level = level_from_sea(
+            azimuth + before.azimuth_offset_deg,
+            elevation + before.elevation_offset_deg,
+            before.true_range_m(met),
+            range_std_m=std,
+            height_m=height_m,
+            height_std_m=float(np.hypot(sea_std_m, chosen.uncertainty.position_m)),
+            solve_offset=solve_offset,
+        )
+    except InputError as error:
+        raise InputError(f"{', '.join(name for name, _ in scans)}: {error}") from error
+    return SeaFit(chosen, before, height_m, level, int(met.size), solve_offset)
 
 
 def sea_keys(result: SeaFit) -> dict[str, float]:
@@ -105,14 +111,28 @@ def _above_mean_sea_m(site: Site, lidar: Lidar) -> float:
     return lidar.position[2] - site.geoid_undulation_m
 
 
-def _met(scans: Sequence[Records]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Head azimuth and elevation of all rays, range at which each meets the sea and its standard deviation."""
-    if not scans or any(not np.any(np.isfinite(scan.cnr_db)) for scan in scans):
-        raise InputError("these rays have no CNR: the edge of the sea cannot be found by radial speed")
-    edges = [edge_range(scan.range_m, scan.cnr_db) for scan in scans]
-    return (
-        np.concatenate([scan.azimuth_deg for scan in scans]),
-        np.concatenate([scan.elevation_deg for scan in scans]),
-        np.concatenate([edge.range_m for edge in edges]),
-        np.concatenate([edge.std_m for edge in edges]),
+def _met(
+    name: str, scan: Records, before: Mounting, height_m: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Head azimuth and elevation of a scan's rays, range at which each meets the sea and its standard deviation."""
+    if not np.any(np.isfinite(scan.cnr_db)):
+        raise InputError(
+            f"{name}: these rays have no CNR: the edge of the sea cannot be found by radial speed"
+        )
+    if scan.range_m.size < EDGE_GATES:
+        raise InputError(
+            f"{name}: rays of {scan.range_m.size} range gate(s) came; the edge of the sea needs {EDGE_GATES} or more"
+        )
+    offsets = Mounting(
+        azimuth_offset_deg=before.azimuth_offset_deg, elevation_offset_deg=before.elevation_offset_deg
     )
+    level_m = sea_range_m(
+        scan.azimuth_deg, scan.elevation_deg, height_m=height_m, mounting=offsets, radius_m=SEEN_RADIUS_M
+    )
+    if not np.any(np.isfinite(level_m)):
+        raise InputError(
+            f"{name}: no ray of a level head would meet the sea: the lowest looks {np.nanmin(scan.elevation_deg):.2f}° up. "
+            "Needed: low scans over water, that look below the horizon; for maps of hard targets see `cnr-map fit`"
+        )
+    edge = edge_range(scan.range_m, scan.cnr_db)
+    return scan.azimuth_deg, scan.elevation_deg, edge.range_m, edge.std_m

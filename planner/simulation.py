@@ -94,6 +94,20 @@ def virtual(plan: Plan, options: Options) -> Virtual:
     return Virtual(layouts, target, states, tuple(_virtual_scan(plan, layout, target) for layout in layouts))
 
 
+def told_scans(plan: Plan) -> tuple[str, ...]:
+    """What a virtual campaign leaves out of the site's scans, or flies in part, a sentence each, with the reason."""
+    told = []
+    for layout in plan.layouts:
+        name, spec = layout.name, layout.spec
+        if not layout.measures_wind:
+            told.append(f"{name}: left out, as it looks for a hard target, not for wind")
+        elif not layout.targets:
+            told.append(f"{name}: left out, as it has no target: give it one, whose gate is then flown")
+        elif spec.type in ("points", "rhi", "raster"):
+            told.append(f"{name}: every ray is flown at the gate of {layout.targets[0]} alone, no other gate")
+    return tuple(told)
+
+
 def draw_states(
     site: Site, target: str, excluded: SectorSet, count: int, rng: np.random.Generator
 ) -> tuple[WindState, ...]:

@@ -185,12 +185,14 @@ class Tolerance(Noun):
 
 
 class Terrain(Noun):
-    """A height model of the ground."""
+    """A height model of the ground, as `terrain: {file: dem.tif, height_datum: above_sea_level}`. Reading it needs rasterio:
+    `pip install '.[terrain]'`."""
 
     file: Path
     """Raster of ground heights, such as a GeoTIFF, in any CRS that it states. E.g. dem.tif"""
     height_datum: Literal["above_sea_level", "ellipsoidal"] | None = None
-    """What the raster's heights count from. Without it: what the raster itself says. E.g. above_sea_level"""
+    """What the raster's heights count from. Without it: what the raster itself says; most say nothing, and then it has to
+    be given. E.g. above_sea_level"""
     surface: Path | None = None
     """Raster of the heights of canopy and buildings above the ground, on the same cells. Without it: only bare ground
     blocks a beam. E.g. canopy.tif"""
@@ -269,7 +271,7 @@ class Site(Noun):
     ground_height_m: Number | None = None
     """Height of flat ground. Without it: `terrain`, else the height of what stands lowest. E.g. 4.8"""
     terrain: Terrain | None = None
-    """Height model of ground that is not flat. Without it: flat ground."""
+    """Height model of ground that is not flat; needs the extra `.[terrain]`. Without it: flat ground."""
     lidars: tuple[Lidar, ...] = ()
     """The scanning lidars."""
     masts: tuple[Mast, ...] = ()

@@ -4,12 +4,13 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from geometry.errors import InputError
-from planner.analysis_files import file_name
+from planner.analysis_files import file_name, require_own_files
+from planner.files.site_copy import copy_site
 from planner.output import output_folder
 from planner.plan import Plan
 from planner.simulation import (
@@ -20,6 +21,7 @@ from planner.simulation import (
     Progress,
     campaign_parts,
     joined,
+    told_scans,
     true_means,
     virtual,
 )
@@ -30,16 +32,16 @@ if TYPE_CHECKING:
     from reconstruct.formats.aas_scenarios import Scenarios
 
 Format = Literal["csv", "parquet", "store", "netcdf", "windscanner", "database"]
-FORMATS: tuple[Format, ...] = ("csv", "parquet", "store", "netcdf", "windscanner", "database")
+FORMATS: tuple[Format, ...] = get_args(Format)
 DATABASE = "rays.sqlite"  # where no url is given
 
-# What the campaign file says of each: kind, and the files of a scan.
+# What the campaign file says of each: kind, and the files of a scan: `s-????` does not match those of a scan `s-2`.
 READ_AS: dict[Format, tuple[str, str]] = {
-    "csv": ("csv", "{}-*.csv"),
-    "parquet": ("parquet", "{}-*.parquet"),
+    "csv": ("csv", "{}-????.csv"),
+    "parquet": ("parquet", "{}-????.parquet"),
     "store": ("store", "{}.duckdb"),
-    "netcdf": ("cfradial", "{}-*.nc"),
-    "windscanner": ("windscanner", "{}_*_wind.txt"),
+    "netcdf": ("cfradial", "{}-????.nc"),
+    "windscanner": ("windscanner", "{}_????_wind.txt"),
     "database": ("database", DATABASE),
 }
 
@@ -52,6 +54,7 @@ def write_virtual(
     out: Path,
     *,
     options: Options,
+    beside: Path | None = None,
     kind: Format = "csv",
     url: str | None = None,
     progress: Progress | None = None,
@@ -68,6 +71,8 @@ def write_virtual(
         Folder, made when all is there.
     options
         Days, seed, share of lost rays.
+    beside
+        Folder of the site file: what it names there is copied too. Without it: the current folder.
     kind
         Format of the rays.
     url
@@ -84,11 +89,12 @@ def write_virtual(
     Raises
     ------
     InputError
-        If a url is given for files, or a database refuses.
+        If a url is given for files, two scans would share a file, or a database refuses.
     """
     if url is not None and kind != "database":
         raise InputError(f"--url came with --format {kind}: it belongs to --format database")
     campaign = virtual(plan, options)
+    require_own_files(layout.name for layout in campaign.layouts)
     with output_folder(out) as folder:
         parts = _watched(campaign_parts(campaign, plan, options), len(campaign.states), progress)
         with _ray_writer(plan, folder, kind, url) as rays:
@@ -97,19 +103,29 @@ def write_virtual(
                     rays.write(layout.name, joined([part.records[layout.name] for part in day]))
                 _append_mast(folder / "mast.csv", [part.mast for part in day])
                 _append(folder / "truth.csv", [true_means(part) for part in day])
-        (folder / "site.yaml").write_text(site_text, encoding="utf-8")
+        _write_site(site_text, Path() if beside is None else beside, folder, out)
         text = campaign_text(plan, {layout.name: rays.told(layout.name) for layout in campaign.layouts})
         (folder / "campaign.yaml").write_text(text, encoding="utf-8")
         names = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
     return [out / "campaign.yaml", *(out / name for name in names if name.name != "campaign.yaml")]
 
 
+def _write_site(text: str, source: Path, folder: Path, out: Path) -> None:
+    """The site file with what it names; where the campaign is written beside it, all that is there already."""
+    if out.resolve() == source.resolve():
+        (folder / "site.yaml").write_text(text, encoding="utf-8")
+    else:
+        copy_site(text, source, folder)
+
+
 def campaign_text(plan: Plan, inputs: Mapping[str, str]) -> str:
     """The campaign file that goes with the data; `inputs` tells of each scan where its rays are."""
     listed = "\n".join(f"  - {{scan: {_quoted(name)}, {told}}}" for name, told in inputs.items())
+    notes = [f"# {note}" for note in told_scans(plan)]
     pairs = [pair for pair in plan.site.pairs if set(pair.scans) <= set(inputs)]
     lines = [
         "# A virtual campaign: `lidarplan retrieve` this file, then `lidarplan compare` it.",
+        *notes,
         f"name: {_quoted(plan.site.name)}",
         "site: site.yaml",
         f"inputs:                          # angles are the head's; the site file's offsets turn them\n{listed}",
@@ -160,7 +176,7 @@ class _RayWriter:
 
         number = self._days.setdefault(scan, 0)
         self._days[scan] += 1
-        name = READ_AS[self._kind][1].format(file_name(scan)).replace("*", f"{number:04d}")
+        name = READ_AS[self._kind][1].format(file_name(scan)).replace("????", f"{number:04d}")
         path = self._folder / name
         match self._kind:
             case "csv":

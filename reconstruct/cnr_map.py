@@ -13,8 +13,10 @@ from reconstruct.records import Records
 MIN_RAYS = 9  # three by three: less has no inside
 MIN_GATES = 5
 
-# Angles of one row or column differ by less than this part of the window; farther apart is the next one.
+# Angles of one row or column differ by less than this part of the window; farther apart is the next one. Many rays lie
+# closer than that without sharing any angle (42,525 staggered ones: 2e-5): a tenth of their even spacing is the same then.
 SAME_SHARE = 1e-4
+SAME_SPACING = 0.1
 
 ROW_RAYS = 3  # rows and columns are told by angles that so many rays share
 
@@ -118,7 +120,7 @@ def _step(angle_deg: FloatArray) -> tuple[float, int]:
     ordered = np.unique(angle_deg)
     span = float(ordered[-1] - ordered[0])
     gaps = np.diff(ordered)
-    gaps = gaps[gaps > SAME_SHARE * span]
+    gaps = gaps[gaps > min(SAME_SHARE, SAME_SPACING / angle_deg.size) * span]
     return (float(np.median(gaps)) if gaps.size else 0.0), gaps.size + 1
 
 

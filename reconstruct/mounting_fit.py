@@ -11,7 +11,16 @@ from geometry.arrays import FloatArray
 from geometry.beams import beam_to
 from geometry.errors import InputError
 from geometry.head import Mounting
-from reconstruct.sightings import ANGLES, Angle, Sighting, angles_left, undetermined, whitened, whitening
+from reconstruct.sightings import (
+    ANGLES,
+    Angle,
+    Sighting,
+    angles_left,
+    solvable,
+    undetermined,
+    whitened,
+    whitening,
+)
 
 OUTLIER_CHANCE = 1e-3  # residuals that good data have less often than this are called an outlier's
 SIGNIFICANT_CHANCE = 0.05  # two-sided
@@ -206,10 +215,11 @@ def _refuse_undetermined(
     open_angles = undetermined(sightings, start=start, solve=solve, head_std_m=head_std_m)
     if open_angles:
         named = ", ".join(sightings[number].name for number in kept) or "none"
+        fewer = ",".join(solvable(sightings, start=start, solve=solve, head_std_m=head_std_m))
+        less = f"solve for what they do determine (--solve {fewer})" if fewer else "solve for other angles"
         raise InputError(
             f"{len(kept)} hard target(s) ({named}) do not determine {', '.join(open_angles)}: needed are three "
-            "or more whose bearings differ widely, not one, and not in a line with the lidar. Add targets, or "
-            "solve for less"
+            f"or more whose bearings differ widely, not one, and not in a line with the lidar. Add targets, or {less}"
         )
 
 

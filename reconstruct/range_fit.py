@@ -10,6 +10,10 @@ from geometry.gates import Probe
 
 PEAK_STEPS = 4  # Gauss-Newton steps from the nearest gate: the third changes micrometres
 EDGE_STEPS = 30
+EDGE_GATES = 6  # four numbers are fitted
+LEAST_DAMPING = 1e-9  # of the steps: with less, numbers that do not tell on a ray make a singular matrix
+# A fall within one gate tells no more than that: steeper [1/gate] is all the same, and its middle lies anywhere in the gate.
+STEEPEST = 4.0
 MIN_PEAK_RAYS = 2
 
 
@@ -121,7 +125,8 @@ def edge_range(range_m: ArrayLike, cnr_db: ArrayLike, *, steepness_per_m: float 
     -----
     :math:`\mathrm{CNR}(r) = l + (h - l)/(1 + e^{g(r - m)})`; typical h -8 dB, l -30 dB, g 0.2/m: Rott et al.
     (2022), Wind Energ. Sci. 7, 283, doi:10.5194/wes-7-283-2022. Damped Gauss-Newton for all rays together.
-    The standard deviation takes the gates' noise as independent.
+    The standard deviation takes the gates' noise as independent; where the fall lies within a gate, it is
+    that of a place anywhere in it (gate/√12) at least.
 
     Examples
     --------
@@ -131,7 +136,7 @@ def edge_range(range_m: ArrayLike, cnr_db: ArrayLike, *, steepness_per_m: float 
     ([477.68], [-8.0])
     """
     ranges, cnr = np.asarray(range_m, dtype=np.float64), np.asarray(cnr_db, dtype=np.float64)
-    if cnr.ndim != 2 or ranges.shape != cnr.shape[1:] or ranges.size < 6:
+    if cnr.ndim != 2 or ranges.shape != cnr.shape[1:] or ranges.size < EDGE_GATES:
         raise InputError(
             f"ranges of shape {ranges.shape} and CNR of {cnr.shape} came; allowed: (gate,) and (ray, gate), "
             "six gates or more"
@@ -141,13 +146,15 @@ def edge_range(range_m: ArrayLike, cnr_db: ArrayLike, *, steepness_per_m: float 
     fitted = _edge_start(ranges, data, known, steepness_per_m)
     error = _edge_error(ranges, data, known, fitted)
     damping = np.full(len(cnr), 1e-3)
+    steepest = STEEPEST / float(np.median(np.diff(ranges)))
     for _ in range(EDGE_STEPS):
         tried = fitted + _edge_step(ranges, data, known, fitted, damping)
+        tried[:, 3] = np.clip(tried[:, 3], -steepest, steepest)
         tried_error = _edge_error(ranges, data, known, tried)
         better = tried_error <= error
         fitted, error = np.where(better[:, None], tried, fitted), np.where(better, tried_error, error)
-        damping = np.where(better, damping * 0.2, np.minimum(damping * 10.0, 1e9))
-    return _edges(ranges, known, fitted, error)
+        damping = np.clip(damping * np.where(better, 0.2, 10.0), LEAST_DAMPING, 1e9)
+    return _edges(ranges, known, fitted, error, steepest)
 
 
 def _edge_start(ranges: FloatArray, data: FloatArray, known: FloatArray, steepness: float) -> FloatArray:
@@ -195,13 +202,16 @@ def _edge_step(
     return np.asarray(np.linalg.solve(damped, right[:, :, None])[:, :, 0])
 
 
-def _edges(ranges: FloatArray, known: FloatArray, fitted: FloatArray, error: FloatArray) -> Edge:
+def _edges(
+    ranges: FloatArray, known: FloatArray, fitted: FloatArray, error: FloatArray, steepest: float
+) -> Edge:
     """What is an edge, with its uncertainty; NaN for what is not."""
     slopes = _edge_slopes(ranges, fitted) * known[:, :, None]
     normal = np.einsum("rgi,rgj->rij", slopes, slopes)
     noise = error / np.maximum(known.sum(axis=1) - 4, 1)
     covariance = np.linalg.pinv(normal) * noise[:, None, None]
-    std = np.sqrt(np.maximum(covariance[:, 2, 2], 0.0))
+    within_gate_m = STEEPEST / steepest / np.sqrt(12.0) * (fitted[:, 3] >= steepest)
+    std = np.hypot(np.sqrt(np.maximum(covariance[:, 2, 2], 0.0)), within_gate_m)
     fall = fitted[:, 0] - fitted[:, 1]
     sound = (fall > 3.0 * np.sqrt(noise)) & (fitted[:, 3] > 0)
     sound &= (fitted[:, 2] > ranges[0]) & (fitted[:, 2] < ranges[-1])

@@ -143,7 +143,9 @@ def level_from_sea(
     start = np.array([0.0, 0.0, *([0.0] if solve_offset else []), *([height_m] if height_std_m > 0 else [])])
     robust = least_squares(left, start, loss="soft_l1", x_scale="jac")
     slopes = np.asarray(robust.jac, dtype=np.float64)
-    size = np.linalg.svd(slopes / np.linalg.norm(slopes, axis=0), compute_uv=False)
+    norms = np.linalg.norm(slopes, axis=0)
+    told = bool(np.all(np.isfinite(norms) & (norms > 0)))  # not by rays that pass over the horizon
+    size = np.linalg.svd(slopes / norms, compute_uv=False) if told else np.zeros(1)
     if not size[-1] > 1e-3 * size[0]:
         raise InputError(
             "the ranges to the sea do not determine the tilt: measure at bearings around the lidar, and at two "

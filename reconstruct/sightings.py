@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -136,6 +137,28 @@ def undetermined(
     return tuple(
         angle for angle, std in zip(solve, stds, strict=True) if not std <= GOOD_DILUTION * best[angle]
     )
+
+
+def solvable(
+    sightings: Sequence[Sighting],
+    *,
+    start: Mounting | None = None,
+    solve: tuple[Angle, ...] = ANGLES,
+    head_std_m: float = 0.0,
+) -> tuple[Angle, ...]:
+    """As many of the angles as targets determine together, where the others are taken as they are; offsets first.
+
+    Examples
+    --------
+    >>> one = Sighting("a", 900 * unit_vector(40.0, 3.0), 40.0, 3.0, 900.0, .01, .01, .1, .1)
+    >>> solvable([one])
+    ('azimuth_offset_deg', 'elevation_offset_deg')
+    """
+    for count in range(len(solve), 0, -1):
+        for some in combinations(solve, count):
+            if not undetermined(sightings, start=start, solve=some, head_std_m=head_std_m):
+                return some
+    return ()
 
 
 def _at_horizon(item: Sighting, mounting: Mounting) -> Sighting:

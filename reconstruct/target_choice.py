@@ -10,7 +10,7 @@ from geometry.arrays import FloatArray
 from geometry.beams import beam_to
 from geometry.errors import InputError
 from geometry.head import Mounting
-from reconstruct.sightings import ANGLES, Angle, Sighting, predicted_std_deg, undetermined
+from reconstruct.sightings import ANGLES, Angle, Sighting, predicted_std_deg, solvable, undetermined
 
 MAX_CANDIDATES = 12  # 220 sets of three
 SECTOR_DEG = 360.0 / MAX_CANDIDATES
@@ -23,6 +23,8 @@ class Choice(NamedTuple):
     std_deg: tuple[float, ...]  # of each angle; infinite where the targets tell nothing
     solved: tuple[Angle, ...]
     undetermined: tuple[Angle, ...]  # angles too weakly determined to be worth writing down
+    solvable: tuple[Angle, ...]  # those they do determine where the others are taken as they are
+    solvable_std_deg: tuple[float, ...]  # of each of these then
     compared: int  # candidates of which every set was tried
     candidates: int  # that there were
 
@@ -85,11 +87,15 @@ def best_targets(
     ]
     best = min(range(len(sets)), key=lambda number: _rank(stds[number]))
     chosen = [candidates[place] for place in sets[best]]
+    fewer = solvable(chosen, start=start, solve=solve, head_std_m=head_std_m)
+    fewer_stds = predicted_std_deg(chosen, start=start, solve=fewer, head_std_m=head_std_m) if fewer else ()
     return Choice(
         names=tuple(item.name for item in chosen),
         std_deg=tuple(float(value) for value in stds[best]),
         solved=solve,
         undetermined=undetermined(chosen, start=start, solve=solve, head_std_m=head_std_m),
+        solvable=fewer,
+        solvable_std_deg=tuple(float(value) for value in fewer_stds),
         compared=len(candidates),
         candidates=len(sightings),
     )

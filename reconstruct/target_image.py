@@ -49,7 +49,7 @@ def image_of(cnr_map: CnrMap, probe: Probe) -> Image:
     gate = int(np.einsum("rg,rg->g", above, above).argmax())
     bright = int((above[:, gate] > 0).sum())
     if bright < BRIGHT_RAYS:
-        strongest = float((filtered / noise).max())
+        strongest = float((filtered.astype(np.float64) / noise).max())
         raise InputError(
             f"no hard target in the map: the strongest return stands {strongest:.1f} standard deviations above "
             f"the rays around it and {bright} rays hit; needed: {BRIGHT_NOISES:g} and {BRIGHT_RAYS}. "
@@ -60,7 +60,8 @@ def image_of(cnr_map: CnrMap, probe: Probe) -> Image:
 
 def _excess(cnr_map: CnrMap) -> ImageArray:
     """Linear power (ray, gate) above the median of its gate; 0 where it is missing."""
-    power = np.exp(np.float32(0.1 * np.log(10.0)) * cnr_map.cnr_db.astype(np.float32))
+    with np.errstate(over="ignore"):  # 385 dB and more are no measurement: missing
+        power = np.exp(np.float32(0.1 * np.log(10.0)) * cnr_map.cnr_db.astype(np.float32))
     missing = ~np.isfinite(power)
     some = power[_some(len(power))]
     if not missing.any():

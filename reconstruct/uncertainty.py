@@ -19,6 +19,8 @@ from reconstruct.wind import WindState, uv_mps
 COMMON = 1.0
 """Correlation between the rays of one lidar of an error that they share."""
 
+REFERENCE = "reference instrument"
+"""What a budget calls the instrument that the retrieved wind is compared with."""
 
 CLOCK_NEEDS_TURBULENCE = "a clock difference acts through turbulence, and a steady wind has none"
 
@@ -290,15 +292,15 @@ def budget(
     >>> entries = budget({"noise": np.diag([0.03, 0.01])}, WindState(speed_mps=10.0, from_deg=0.0),
     ...     reference_speed_mps=0.1)
     >>> [(e.source, round(e.speed_std_mps, 4), round(e.speed_share, 3)) for e in entries]
-    [('noise', 0.1, 0.5), ('reference', 0.1, 0.5), ('total', 0.1414, 1.0)]
+    [('noise', 0.1, 0.5), ('reference instrument', 0.1, 0.5), ('total', 0.1414, 1.0)]
     """
     along = np.stack(uv_mps(1.0, wind.from_deg))
     across = np.array([-along[1], along[0]])
     speed = {name: float(along @ cov @ along) for name, cov in covariances_m2s2.items()}
     side = {name: float(across @ cov @ across) for name, cov in covariances_m2s2.items()}
     if reference_speed_mps > 0 or reference_direction_deg > 0:
-        speed["reference"] = reference_speed_mps**2
-        side["reference"] = (np.radians(reference_direction_deg) * wind.speed_mps) ** 2
+        speed[REFERENCE] = reference_speed_mps**2
+        side[REFERENCE] = (np.radians(reference_direction_deg) * wind.speed_mps) ** 2
     speed["total"], side["total"] = sum(speed.values()), sum(side.values())
     entries = [_entry(name, speed, side, wind.speed_mps) for name in speed]
     lost = [BudgetEntry(name, None, None, None, None, reason) for name, reason in (unknown or {}).items()]

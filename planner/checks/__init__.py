@@ -2,12 +2,23 @@
 
 from collections.abc import Callable, Iterator
 
-from planner.checks import beams, crossing, instrument, joint_fit, map_frame, obstruction, timing, wakes
+from planner.checks import (
+    beams,
+    crossing,
+    heights,
+    instrument,
+    joint_fit,
+    map_frame,
+    obstruction,
+    timing,
+    wakes,
+)
 from planner.finding import Finding, by_severity
 from planner.plan import Plan
 
 CHECKS: tuple[Callable[[Plan], Iterator[Finding]], ...] = (
     map_frame.find,
+    heights.find,
     beams.find,
     crossing.find,
     joint_fit.find,

@@ -4,15 +4,12 @@ from collections.abc import Iterator
 
 from planner.crs_area import is_transverse_mercator
 from planner.finding import Finding
-from planner.ground import ground_under_m
 from planner.plan import Plan
 
 # A UTM zone is 3° to each side; beyond it scale and convergence grow fast.
 FAR_FROM_MERIDIAN_DEG = 3.5
 # Closer together, two lidars or two targets are one and the same.
 SAME_PLACE_M = 1.0
-# One level for the ground of a site is not more exact; farther below it a head's height is a slip.
-HEAD_BELOW_GROUND_M = 2.0
 
 
 def find(plan: Plan) -> Iterator[Finding]:
@@ -20,8 +17,6 @@ def find(plan: Plan) -> Iterator[Finding]:
     yield from _area(plan)
     yield from _meridian(plan)
     yield from _same_place(plan)
-    yield from _below_ground(plan)
-    yield from _heads(plan)
 
 
 def _area(plan: Plan) -> Iterator[Finding]:
@@ -69,30 +64,3 @@ def _same_place(plan: Plan) -> Iterator[Finding]:
                 "one position is a copy of the other, correct it"
             )
             yield Finding("warning", "same-place", f"{first}, {second}", apart_m, "m", SAME_PLACE_M, text)
-
-
-def _below_ground(plan: Plan) -> Iterator[Finding]:
-    """Targets against the ground."""
-    for target in plan.site.targets:
-        above_m = plan.places.height_above_ground_m(target.name)
-        ground_m = plan.site.target_position_m(target)[2] - above_m
-        if above_m <= 0.0:
-            text = (
-                f"the target is {abs(above_m):.1f} m below the ground at {ground_m:g} m: check its "
-                "height, ground_height_m and height_datum"
-            )
-            yield Finding("error", "target-height", target.name, above_m, "m", 0.0, text)
-
-
-def _heads(plan: Plan) -> Iterator[Finding]:
-    """Heads of the lidars against the ground."""
-    for lidar in plan.site.lidars:
-        ground_m = float(ground_under_m(plan.site, lidar.position))
-        above_m = lidar.position[2] - ground_m
-        if above_m < -HEAD_BELOW_GROUND_M:
-            text = (
-                f"the head is {abs(above_m):.1f} m below the ground at {ground_m:g} m, more than the "
-                f"{HEAD_BELOW_GROUND_M:g} m that uneven ground explains: check its height, ground_height_m and "
-                "height_datum"
-            )
-            yield Finding("warning", "head-height", lidar.name, above_m, "m", -HEAD_BELOW_GROUND_M, text)

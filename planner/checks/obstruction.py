@@ -22,14 +22,11 @@ def find(plan: Plan) -> Iterator[Finding]:
 
 def _lost(plan: Plan, met: Obstruction) -> Finding:
     """Rays that touch; all of them lost to something that stands still is an error."""
-    turned = " (counted as turned to any wind)" if met.part == "rotor" else ""
-    text = (
-        f"{_which(plan, met)} lost to {_named(met)}{turned}, {met.range_m:.0f} m from the head, in every scan: "
-        + (
-            "move the lidar or the target"
-            if met.rays == 1
-            else "move the lidar, raise the scan or leave them out"
-        )
+    when = "in some winds, as it turns" if met.part == "rotor" else "in every wind"
+    text = f"{_which(plan, met)} lost to {_named(met)}, {met.range_m:.0f} m from the head, {when}: " + (
+        "move the lidar or the target"
+        if met.rays == 1
+        else "move the lidar, raise the scan or leave them out"
     )
     whole = met.lost_rays == met.rays and met.part != "rotor"  # a rotor is in the way in some winds only
     severity: Severity = "error" if whole else "warning"

@@ -40,7 +40,9 @@ def check(
         rows = [(finding.severity, finding.code, finding.subject, finding.text) for finding in told_of]
         print_table("", ("severity", "code", "subject", "finding"), rows, fold="finding")
     else:
-        say("Nothing found.")
+        say("Nothing found." if plan.site.scans else "Nothing found, but there are no scans to check.")
+    if not plan.site.scans:
+        remark("There are no scans: beams, crossings, wakes and times are not checked.", quiet=quiet)
     told = ", ".join(
         f"{count} {kind}{'' if count == 1 else 's'}" for count, kind in zip(counts, KINDS, strict=True)
     )

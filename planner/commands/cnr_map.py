@@ -141,11 +141,12 @@ def simulate(
     from numpy.random import default_rng
 
     from geometry.errors import InputError
-    from planner.cnr_map import choose_targets
+    from planner.cnr_map import choose_targets, solvable_angles
     from planner.cnr_simulate import rehearse
     from planner.commands.choices import within
     from planner.commands.load import load_plan
     from planner.output import require_folder
+    from reconstruct.sightings import ANGLES
 
     within("--beam", beam, 0.0, open_below=True)
     within("--pulse-ns", pulse_ns, 0.0, open_below=True)
@@ -176,7 +177,9 @@ def simulate(
     text = ", ".join(f"{name} {value:+.4f}" for name, value in done.planted.items() if value)
     say(f"Planted, beyond what the site file says: {text or 'nothing'}.")
     files = " ".join(f"'{out / file}'" for file in document["maps"].values())
-    remark(f"Next: lidarplan cnr-map fit {files} --site {site} --lidar {lidar}", quiet=quiet)
+    fewer = solvable_angles(places, lidar, names)
+    solve = "" if fewer in ((), ANGLES) else f" --solve {','.join(fewer)}"
+    remark(f"Next: lidarplan cnr-map fit {files} --site {site} --lidar {lidar}{solve}", quiet=quiet)
 
 
 def _planted(text: str) -> dict[str, float]:
@@ -293,6 +296,7 @@ def _choice_document(choice: "Choice | None") -> dict[str, Any] | None:
         "targets": list(choice.names),
         "std_deg": stds,
         "undetermined": list(choice.undetermined),
+        "solvable": list(choice.solvable),
         "compared": choice.compared,
         "candidates": choice.candidates,
     }
@@ -363,7 +367,8 @@ def _print_choice(choice: "Choice | None") -> None:
     if choice is None:
         say("No hard target, mast or turbine is in sight and in reach: the offsets cannot be found by maps.")
         return
-    stds = ", ".join(f"{name} ±{std:.3f}°" for name, std in zip(choice.solved, choice.std_deg, strict=True))
+    told = zip(choice.solvable, choice.solvable_std_deg, strict=True)
+    stds = ", ".join(f"{name} ±{std:.3f}°" for name, std in told) or "no angle"
     say(f"Best targets: {', '.join(choice.names)}; they would give {stds}.")
     if choice.compared < choice.candidates:
         say(
@@ -371,4 +376,12 @@ def _print_choice(choice: "Choice | None") -> None:
             "then the next sure ones."
         )
     if choice.undetermined:
-        say(f"Warning: they leave {', '.join(choice.undetermined)} undetermined.")
+        left = [name for name in choice.solved if name not in choice.solvable]
+        say(
+            f"Warning: they do not determine {', '.join(choice.undetermined)} together: needed are three targets or more whose "
+            "bearings differ widely."
+        )
+        if choice.solvable:
+            say(
+                f"To fit what they tell, with {', '.join(left)} as the site file has them: --solve {','.join(choice.solvable)}."
+            )

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from planner.cnr_fit import Drift, HeadFit
     from planner.sea_fit import SeaFit
     from reconstruct.mounting_fit import MountingFit
+    from reconstruct.sea_level import Level
     from reconstruct.sightings import Angle
 
 MapsArgument = Annotated[
@@ -184,9 +185,16 @@ def _print_level(result: "SeaFit") -> None:
     print_table(f"{result.lidar.name}, nose up and right side down", ("", "before", "found", "std"), rows)
     found = result.level
     say(
-        f"{found.rays} of {result.rays} rays meet the sea, {found.height_m:.2f} m under the head; ranges are left over by "
-        f"{found.residual_std_m:.1f} m (standard deviation)."
+        f"{found.rays} of {result.rays} rays meet the sea; ranges are left over by {found.residual_std_m:.1f} m (standard "
+        f"deviation). Height of the head above the sea: {result.height_m:.2f} m by the site file and --sea-height, "
+        f"{_fitted_height(found)} fit."
     )
+
+
+def _fitted_height(found: "Level") -> str:
+    if not found.height_std_m:
+        return "taken as it is by the"
+    return f"{found.height_m:.2f} ± {found.height_std_m:.2f} m by the"
 
 
 def _angles(text: str | None) -> "tuple[Angle, ...]":

@@ -29,7 +29,7 @@ FiguresOption = Annotated[
 NoFiguresOption = Annotated[bool, typer.Option("--no-figures", help="Draw no figure.")]
 
 SPEED = (
-    "scan", "sector °", "periods", "slope", "± slope", "predicted", "± lasting", "apart in s.e.", "r²", "r² uncentred",
+    "scan", "sector °", "rays", "periods", "slope", "± slope", "predicted", "± lasting", "apart in s.e.", "r²", "r² uncentred",
     "median m/s", "residual ± m/s", "predicted ± m/s", "apart in s.e.",
 )  # fmt: skip
 DIRECTION = (
@@ -127,6 +127,7 @@ def _speed(row: "Row") -> tuple[str, ...]:
     speed = row.speed
     return (
         *_head(row),
+        str(row.matched.rays),
         str(speed.pairs),
         _text(speed.slope, ".4f"),
         _text(speed.slope_standard_error, ".4f"),

@@ -63,7 +63,7 @@ def export(
     """Everything planned as GIS layers, tables, files for the instruments, and a field sheet per lidar."""
     from planner.commands.choices import chosen, within
     from planner.commands.load import load_plan
-    from planner.handover.export import KINDS, Choice, default_kinds, with_gates
+    from planner.handover.export import KINDS, Choice, default_kinds, foreign_places, with_gates
     from planner.handover.export import export as export_files
     from planner.output import require_folder
     from planner.plan import Plan
@@ -84,12 +84,14 @@ def export(
         declination_deg=declination,
         progress=lambda text: remark(text, quiet=quiet),
     )
+    foreign = foreign_places(plan.site, out) if "gpkg" in choice.kinds else None
+    left_out = [*choice.left_out, *([foreign] if foreign else [])]
     if json:
-        say_json({"files": [str(path) for path in files], "left_out": list(choice.left_out)})
+        say_json({"files": [str(path) for path in files], "left_out": left_out})
         return
     for path in files:
         say(str(path))
-    for text in choice.left_out:
+    for text in left_out:
         remark(text, quiet=quiet)
     if {"halo", "windscanner"} & {path.relative_to(out).parts[0] for path in files}:
         remark("Angles for instruments are head angles. Try new files with the laser off first.", quiet=quiet)

@@ -54,13 +54,14 @@ def place(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Where to put lidars: ranked places, what binds them, and maps of every criterion."""
+    """Where to put lidars: ranked places, what binds them, and maps of the error and of what hinders."""
     from planner.commands.choices import chosen, within
     from planner.commands.progress import shown
     from planner.output import require_folder
     from planner.placement.fan_out import How
     from planner.placement.maps import default_grid
     from planner.placement.ranking import place as ranked_places
+    from planner.placement.ranking import ranked_by
 
     within("--reach", reach, 0.0, open_below=True)
     within("--head-height", head_height, 0.0)
@@ -73,7 +74,7 @@ def place(
         how = How(scheduler=scheduler, checkpoint=resume, progress=progress)
         candidates = default_grid(task, count=grid, reach_m=reach)
         found = ranked_places(task, candidates, how=how, cost=cost, tier=by)
-    _tell(found, *_written(found, out), json=json, quiet=quiet)
+    _tell(found, *_written(found, out), ranked_by(task, by, cost=cost is not None), json=json, quiet=quiet)
 
 
 def _task(
@@ -120,8 +121,10 @@ def _written(found: "Placement", out: Path) -> tuple[list[str], str | None]:
     return [str(out / name) for name in (*names, *pictures)], lacking
 
 
-def _tell(found: "Placement", files: list[str], lacking: str | None, *, json: bool, quiet: bool) -> None:
-    """Print the ranking."""
+def _tell(
+    found: "Placement", files: list[str], lacking: str | None, ranked: str, *, json: bool, quiet: bool
+) -> None:
+    """Print the ranking, and what it is by."""
     from planner.placement.ranking import standing_remarks
     from planner.placement.write import rows_of
 
@@ -139,7 +142,10 @@ def _tell(found: "Placement", files: list[str], lacking: str | None, *, json: bo
     turbulent = found.ranked[0].turbulent is not None
     kind = "without and with turbulence; the search was by the latter" if turbulent else "linear tier"
     folder, names = Path(files[0]).parent, ", ".join(Path(file).name for file in files)
-    remark(f"Errors: {kind}, one retrieval, over the site's wind. Files in {folder}: {names}", quiet=quiet)
+    remark(
+        f"{ranked}. Errors: {kind}, one retrieval, over the site's wind. Files in {folder}: {names}",
+        quiet=quiet,
+    )
 
 
 def _limits(

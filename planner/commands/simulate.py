@@ -65,7 +65,7 @@ def simulate(
     from planner.commands.load import load_plan
     from planner.commands.progress import shown
     from planner.output import require_folder
-    from planner.simulation import Options
+    from planner.simulation import Options, told_scans
     from planner.virtual_files import FORMATS, write_virtual
     from reconstruct.virtual import VirtualSettings
 
@@ -87,8 +87,13 @@ def simulate(
         files = write_virtual(
             plan, text, out, options=options, beside=path.parent, kind=form, url=url, progress=progress
         )
+    notes = told_scans(plan)
     if json:
-        say_json({"campaign": str(files[0]), "files": [str(path) for path in files[1:]]})
+        say_json(
+            {"campaign": str(files[0]), "files": [str(path) for path in files[1:]], "notes": list(notes)}
+        )
     else:
+        for note in notes:
+            remark(f"{note}.", quiet=quiet)
         say(str(files[0]))
         remark(f"Next: lidarplan retrieve {files[0]}, then lidarplan compare {files[0]}.", quiet=quiet)

@@ -130,7 +130,8 @@ def _print_bins(item: "Stay", per_bin: float) -> None:
     columns = [f"{edges[number]:.0f}–{edges[number + 1]:.0f}°" for number in some]
     last = int(np.flatnonzero(found.expected.sum(axis=1) >= SHOWN)[-1]) + 1 if some else 0
     parts = [(number, number + 1) for number in range(last)]
-    parts += [(last, len(speeds) - 1)] if last < len(speeds) - 1 else []  # what hardly ever blows, in one row
+    blows = int(np.flatnonzero(found.expected.sum(axis=1) > 0)[-1]) + 1 if some else 0
+    parts += [(last, blows)] if last < blows else []  # what hardly ever blows, in one row
     rows = []
     for first, end in parts if some else ():
         counts = found.expected[first:end].sum(axis=0)

@@ -42,7 +42,7 @@ def wakes(
     print_table(plan.site.name, columns, [_row(item) for item in plan.exclusions])
     remark(
         "Degrees from true north that the wind comes from. Excluded: a wake touches what the scan measures, "
-        "the arc of its gates or the probe of a stare. Free: none does.",
+        "the arc of its gates or the probe of a stare. Free: none does. –: not asked (wakes.model).",
         quiet=quiet,
     )
 
@@ -71,8 +71,8 @@ def _row(item: "Exclusion") -> tuple[str, ...]:
         item.lidar,
         item.scan,
         item.target,
-        _spans(item.of_model("jensen")),
-        _spans(item.of_model("iec")),
+        _spans(item.of_model("jensen")) if item.model != "iec" else "–",
+        _spans(item.of_model("iec")) if item.model != "jensen" else "–",
         _spans(item.free),
         f"{item.lost_share:.0%}",
     )

@@ -1,6 +1,7 @@
 """A campaign against its mast: scatter, time series, residual against direction, regression per sector size."""
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 MAST, LIDAR, PREDICTED = INK, LIDARS[0], EXCLUDED
 LEAST_PERIODS = 2
 HEAD_IN = 0.56  # of the paper, for the title and the line under it
+LINE_IN = 0.16  # for each further line
 LONG_AXIS_MPS = 14.0  # marked every 5 m/s, a shorter one every 2 m/s
 MARKS = ".x+1"  # beside the colour, for who does not see it
 
@@ -202,14 +204,16 @@ def told(series: Series) -> str:
 def title(figure: "Figure", what: str, where: str) -> None:
     """Say above a figure what it shows, and under that of what."""
     width_in, height_in = figure.get_size_inches()
+    longest = int(width_in * 13)  # letters of the second size to the inch
+    told = [shown(line, longest=longest) for line in wrap(where, longest, max_lines=3, placeholder="…")]
+    head_in = HEAD_IN + (len(told) - 1) * LINE_IN
     engine = figure.get_layout_engine()
     if engine is not None:
-        engine.set(rect=(0, 0, 1, 1 - HEAD_IN / height_in))  # type: ignore[call-arg]
-    longest = int(width_in * 13)  # letters of the second size to the inch
-    lines = ((0.06, what, 90, 12, "bold", INK), (0.30, where, longest, 9, "normal", INK_SOFT))
-    for down_in, text, most, size, weight, colour in lines:
+        engine.set(rect=(0, 0, 1, 1 - head_in / height_in))  # type: ignore[call-arg]
+    lines = ((0.06, shown(what, longest=90), 12, "bold", INK), (0.30, "\n".join(told), 9, "normal", INK_SOFT))
+    for down_in, text, size, weight, colour in lines:
         figure.text(
-            0.01, 1 - down_in / height_in, shown(text, longest=most), fontsize=size, fontweight=weight, color=colour,
+            0.01, 1 - down_in / height_in, text, fontsize=size, fontweight=weight, color=colour,
             ha="left", va="top", parse_math=False,
         )  # fmt: skip
 

@@ -1,13 +1,15 @@
 """Maps of where lidars may stand, what hinders elsewhere, and how wrong the wind would be."""
 
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geometry.angles import difference_deg
 from geometry.arrays import FloatArray
 from planner.figures.canvas import canvas, image
 from planner.palette import CROSSING, EXCLUDED, INK, INK_SOFT, MAST, PAPER, TURBINE, lidar_colour
-from planner.placement.maps import CRITERIA
+from planner.placement.maps import CRITERIA, of_lidar
 from planner.placement.ranking import Placement
 from planner.placement.search import UNSEEN
 from planner.placement.write import least_slack
@@ -15,11 +17,16 @@ from planner.placement.write import least_slack
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 WIDTH_IN = 8.5
 SCALE_TOP = 2.0  # colours end at this multiple of the least error: farther out nobody wants to stand
 HINDERED = "#d9d5cf"
 COLOURS = "viridis_r"
+SIDES = (  # where a name may stand, right and up of its place [points], in order of preference
+    *((9.0, 6.0), (-9.0, 6.0), (9.0, -14.0), (-9.0, -14.0), (0.0, 12.0), (0.0, -20.0)),
+    *((9.0, 20.0), (-9.0, 20.0), (9.0, -28.0), (-9.0, -28.0)),
+)
 BAR_LABEL = {
     "vector": "error of the wind vector [m/s]",
     "speed": "error of the wind speed [m/s]",
@@ -57,22 +64,45 @@ def error_map(found: Placement) -> bytes:
 
 
 def criteria_maps(found: Placement) -> bytes:
-    """Draw one small map for each criterion that hinders anywhere: what is left over of it, as a PNG."""
-    slack = {name: values for name, values in least_slack(found.seen).items() if np.any(values < 0.0)}
-    names = list(slack) or ["range-max"]
+    """Draw one small map for each criterion that hinders anywhere: what is left over of it, as a PNG.
+
+    The opening angle is among them where the placed lidar pairs with one that stands.
+    """
+    every = {**least_slack(found.seen), **_opening_slack(found)}
+    slack = {name: values for name, values in every.items() if np.any(values < 0.0)} or {
+        "range-max": every["range-max"]
+    }
+    names = list(slack)
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
     high, wide = _size(found)
-    with canvas(3.4 * columns, (3.2 * high / wide + 1.1) * rows + 0.4) as figure:
-        figure.suptitle(
-            "What is left over of each criterion, at the target where it is least", x=0.01, ha="left"
-        )
+    with canvas(3.6 * columns, (2.9 * high / wide + 1.2) * rows + 0.4) as figure:
+        figure.suptitle("What is left over of each criterion" + _where_least(found), x=0.01, ha="left")
         panels = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
         for axes, name in zip(panels, names, strict=False):
-            _criterion(figure, axes, found, name, slack.get(name, least_slack(found.seen)[name]))
+            _criterion(figure, axes, found, name, slack[name])
         for axes in panels[len(names) :]:
             axes.set_visible(False)
         return image(figure)
+
+
+def _where_least(found: Placement) -> str:
+    """Tell of which target, where there are several."""
+    return "" if len(found.task.targets) == 1 else ", at the target where it is least"
+
+
+def _opening_slack(found: Placement) -> dict[str, FloatArray]:
+    """(candidate,) folded opening angle with the standing lidar that crosses best, over what is asked [deg], by criterion.
+
+    Empty where nothing stands: two lidars that are both placed open as their partner allows, which is no map.
+    """
+    task = found.task
+    if not task.fixed:
+        return {}
+    standing = np.concatenate([of_lidar(task, lidar).azimuth_deg for lidar in task.fixed], axis=1)
+    apart = np.abs(difference_deg(found.seen.azimuth_deg[:, None], standing[:, :, None]))
+    folded = np.minimum(apart, 180.0 - apart).max(axis=1)
+    return {"opening": np.asarray(folded.min(axis=0) - task.limits.least_opening_deg)}
 
 
 def sight_map(found: Placement) -> bytes | None:
@@ -108,6 +138,8 @@ def sight_map(found: Placement) -> bytes | None:
 
 
 def _criterion(figure: "Figure", axes: "Axes", found: Placement, name: str, slack: FloatArray) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     unit, meaning = CRITERIA[name]
     values = np.where(np.isfinite(slack), slack, np.nan).reshape(found.grid.shape)
     least = float(np.nanmin(values))
@@ -126,10 +158,12 @@ def _criterion(figure: "Figure", axes: "Axes", found: Placement, name: str, slac
         location="bottom",
         label=f"left over [{unit}]; red: not allowed",
     )
-    axes.set_title(meaning, fontsize=9, wrap=True)
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
+    _frame(axes, found)
+    axes.set_title("\n".join(wrap(meaning, 34)), fontsize=9)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(5))
+        axis.label.set_fontsize(8)
+    axes.tick_params(labelsize=8)
     for target in found.task.targets_m:
         axes.plot(
             *_from_middle(found, target[None])[0],
@@ -259,24 +293,35 @@ def _ranked(axes: "Axes", found: Placement, target: FloatArray) -> None:
 
 
 def _name(axes: "Axes", text: str, here: FloatArray) -> None:
+    """Write a name beside a place, on the side where it covers neither the frame nor a name that is there already."""
     from matplotlib.patheffects import withStroke
 
-    low, high = axes.get_xlim()
-    right = here[0] > low + 0.75 * (high - low)
-    bottom, top = axes.get_ylim()
-    below = here[1] > bottom + 0.95 * (top - bottom)
-    axes.annotate(
+    halo = [withStroke(linewidth=2.5, foreground=PAPER)]
+    label = axes.annotate(
         text,
         tuple(here),
-        xytext=(-9 if right else 9, -12 if below else 6),
+        xytext=SIDES[0],
         textcoords="offset points",
-        ha="right" if right else "left",
         fontsize=9,
         color=INK,
         parse_math=False,
-        path_effects=[withStroke(linewidth=2.5, foreground=PAPER)],
+        path_effects=halo,
         zorder=9,
     )
+    others = [item for item in axes.texts if item is not label]
+    scores = []
+    for side in SIDES:
+        _put(label, side)
+        box = label.get_window_extent()
+        out = not (axes.bbox.contains(box.x0, box.y0) and axes.bbox.contains(box.x1, box.y1))
+        scores.append(sum(box.overlaps(other.get_window_extent()) for other in others) + out)
+    _put(label, SIDES[int(np.argmin(scores))])
+
+
+def _put(label: "Annotation", side: tuple[float, float]) -> None:
+    right, up = side
+    label.xyann = (right, up)
+    label.set_horizontalalignment("left" if right > 0 else "right" if right < 0 else "center")
 
 
 def _legend(figure: "Figure", axes: "Axes", *, flat: bool) -> None:

@@ -89,7 +89,39 @@ def fault_of_raster(file: Path) -> str:
         with rasterio.open(file) as raster:
             return "" if raster.crs is not None else "It does not say in which CRS it is."
     except RasterioError as error:
-        return f"It cannot be read as a raster: {error}."
+        return f"It cannot be read as a raster: {str(error).rstrip('.')}."
+
+
+def fault_of_datum(file: Path, declared: object) -> str:
+    """Say why it is not known what a raster's heights count from; empty where it is, or where it is no raster.
+
+    Parameters
+    ----------
+    file
+        Only its head is read.
+    declared
+        `terrain.height_datum` of the site file, None where it is not given; what is no datum is a fault of its own.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("rasterio") is None or declared not in (None, "above_sea_level", "ellipsoidal"):
+        return ""
+    import rasterio
+    from rasterio.errors import RasterioError
+
+    try:
+        with rasterio.open(file) as raster:
+            said = None if raster.crs is None else _said_datum(raster.crs)
+            nameless = raster.crs is None
+    except RasterioError:
+        return ""
+    if nameless:
+        return ""
+    if said is None and declared is None:
+        return f"{file.name} does not say it itself; most GeoTIFFs do not."
+    if said is not None and declared not in (None, said):
+        return f"{file.name} itself says that its heights are {_spelled(said)}: leave height_datum out."
+    return ""
 
 
 def write_geotiff(
@@ -157,7 +189,9 @@ def _read(rasterio: ModuleType, file: Path) -> tuple[FloatArray, Any, Any]:
             scale, offset = raster.scales[0], raster.offsets[0]
             return np.asarray(heights * scale + offset), raster.transform, raster.crs
     except RasterioError as error:
-        raise InputError(f"{file} cannot be read as a raster ({error}); give a GeoTIFF") from error
+        raise InputError(
+            f"{file} cannot be read as a raster ({str(error).rstrip('.')}); give a GeoTIFF"
+        ) from error
 
 
 def _same_plane(own: Any, crs: str) -> bool:
@@ -169,27 +203,30 @@ def _same_plane(own: Any, crs: str) -> bool:
 
 def _datum(file: Path, own: Any, declared: HeightDatum | None) -> HeightDatum:
     """What a raster's heights count from: as its CRS says, else as declared; never assumed."""
-    from pyproj import CRS
-
-    full = CRS.from_user_input(own.to_wkt())
-    vertical = (
-        next((part for part in full.sub_crs_list if part.is_vertical), None) if full.is_compound else None
-    )
-    said: HeightDatum | None = None
-    if vertical is not None:
-        said = "ellipsoidal" if "ellips" in vertical.name.lower() else "above_sea_level"
-    elif len(full.axis_info) == 3:
-        said = "ellipsoidal"
+    said = _said_datum(own)
     if said is None and declared is None:
         raise InputError(
-            f"{file} does not say what its heights count from; give terrain: {{file: ..., height_datum: above_sea_level}} "
-            "(or ellipsoidal) in the site file"
+            f"{file} does not say what its heights count from; give terrain.height_datum in the site file, as in "
+            f"terrain: {{file: {file.name}, height_datum: above_sea_level}} (or ellipsoidal)"
         )
     if said is not None and declared is not None and said != declared:
         raise InputError(
             f"{file} says that its heights are {_spelled(said)}, the site file {_spelled(declared)}; leave height_datum out"
         )
     return said or declared or "above_sea_level"
+
+
+def _said_datum(own: Any) -> HeightDatum | None:
+    """What the CRS of a raster says that its heights count from; None where it says nothing."""
+    from pyproj import CRS
+
+    full = CRS.from_user_input(own.to_wkt())
+    vertical = (
+        next((part for part in full.sub_crs_list if part.is_vertical), None) if full.is_compound else None
+    )
+    if vertical is not None:
+        return "ellipsoidal" if "ellips" in vertical.name.lower() else "above_sea_level"
+    return "ellipsoidal" if len(full.axis_info) == 3 else None
 
 
 def _spelled(datum: HeightDatum) -> str:

@@ -27,6 +27,7 @@ class Loaded(NamedTuple):
     campaign: Campaign  # paths as seen from the current folder
     site: Site
     path: Path
+    as_written: Campaign  # the same with the paths of its file
 
 
 def load_campaign(path: Path | str) -> Loaded:
@@ -60,7 +61,7 @@ def load_campaign(path: Path | str) -> Loaded:
     found = tree.faults + [YamlFault(tree.line(fault.loc), fault) for fault in faults]
     if found or campaign is None or site is None:
         raise InputError(_report(str(path), found))
-    return Loaded(_rooted(campaign, path.parent), site, path)
+    return Loaded(_rooted(campaign, path.parent), site, path, campaign)
 
 
 def _text(path: Path) -> str:

@@ -3,13 +3,28 @@
 from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from geometry.errors import InputError
 from planner.files.yaml_site import load_site, parse_site
 from planner.output import write_text
 from planner.site import Site
 
+if TYPE_CHECKING:
+    from ruamel.yaml import YAML
+
 WIDE = 100_000  # columns: nothing is folded anew
+
+
+def round_trip() -> "YAML":
+    """A reader and writer of YAML that keeps comments, order and quotes."""
+    from ruamel.yaml import YAML
+
+    yaml = YAML(typ="rt")
+    yaml.preserve_quotes = True
+    yaml.width = WIDE
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    return yaml
 
 
 def edited_lidar(text: str, lidar: str, values: Mapping[str, float]) -> str:
@@ -40,13 +55,9 @@ def edited_lidar(text: str, lidar: str, values: Mapping[str, float]) -> str:
     lidars:  # two
       - {name: a, azimuth_offset_deg: 1.25, mounting: {pitch_deg: 0.03}} # by hand
     """
-    from ruamel.yaml import YAML
     from ruamel.yaml.comments import CommentedMap
 
-    yaml = YAML(typ="rt")
-    yaml.preserve_quotes = True
-    yaml.width = WIDE
-    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml = round_trip()
     document = yaml.load(text)
     entry = next((item for item in document.get("lidars", []) if item.get("name") == lidar), None)
     if entry is None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from geometry.errors import InputError
-from planner.faults import Fault, Loc, key_of, spelled
+from planner.faults import NOTHING, Fault, Loc, key_of, spelled
 from planner.files.fault_words import fault_of, is_echo
 from planner.files.yaml_tree import Tree, YamlFault
 from planner.site import CHECKED, Area, Site
@@ -130,7 +130,8 @@ def _report(name: str, found: list[YamlFault]) -> str:
 # Files that a site names, looked for beside it
 
 
-def _named_files(raw: Mapping[str, object]) -> Iterator[tuple[Loc, str]]:
+def named_files(raw: Mapping[str, object]) -> Iterator[tuple[Loc, str]]:
+    """Every file that a site names, with its place in the site file."""
     for key, field in (("wind", "rose"), ("terrain", "file"), ("terrain", "surface")):
         part = raw.get(key)
         if isinstance(part, Mapping) and isinstance(name := part.get(field), str):
@@ -148,18 +149,24 @@ def _named_files(raw: Mapping[str, object]) -> Iterator[tuple[Loc, str]]:
 
 
 def _missing_files(raw: Mapping[str, object], folder: Path) -> list[Fault]:
-    missing = [(loc, name) for loc, name in _named_files(raw) if not (folder / name).is_file()]
+    missing = [(loc, name) for loc, name in named_files(raw) if not (folder / name).is_file()]
     return [Fault(loc, name, f"a file that exists (looked for {folder / name})") for loc, name in missing]
 
 
 def _no_rasters(raw: Mapping[str, object], folder: Path) -> Iterator[Fault]:
     """Files of a terrain that are there but no rasters."""
-    for loc, name in _named_files(raw):
+    for loc, name in named_files(raw):
         if loc[0] == "terrain" and (folder / name).is_file():
-            from planner.files.raster import fault_of_raster
+            from planner.files.raster import fault_of_datum, fault_of_raster
 
+            terrain = raw["terrain"]
+            declared = terrain.get("height_datum") if isinstance(terrain, Mapping) else None
             if why := fault_of_raster(folder / name):
                 yield Fault(loc, name, "a raster of heights with its CRS, such as a GeoTIFF", why)
+            elif loc[1] == "file" and (why := fault_of_datum(folder / name, declared)):
+                came = NOTHING if declared is None else declared
+                allowed = "what the raster's heights count from: above_sea_level or ellipsoidal"
+                yield Fault(("terrain", "height_datum"), came, allowed, why)
 
 
 def _rooted(site: Site, folder: Path) -> Site:

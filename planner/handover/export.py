@@ -10,6 +10,7 @@ from planner.handover import halo, windscanner
 from planner.handover.names import file_stems
 from planner.handover.scan_table import scan_table, scan_table_csv
 from planner.output import output_folder
+from planner.placement.write import PLACES
 from planner.plan import Plan
 from planner.report_tables import crossing_table, pointing_table
 from planner.report_values import Table, csv_text
@@ -110,7 +111,7 @@ def export(
                 progress(f"{plan.site.name}: {kind}")
                 _write(plan, staging, kind, declination_deg)
                 if kind == "gpkg":
-                    _add_places(folder, staging / "plan.gpkg")
+                    _add_places(plan.site, folder, staging / "plan.gpkg")
         written = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     return [folder / path for path in written]
 
@@ -158,16 +159,37 @@ def _table_csv(table: Table) -> str:
     return csv_text(table.file_columns, table.file_rows)
 
 
-def _add_places(folder: Path, package: Path) -> None:
+def _add_places(site: Site, folder: Path, package: Path) -> None:
     """Put the ranked places that `lidarplan place` has left in the same folder into the GeoPackage too, as a layer."""
-    from planner.placement.write import PLACES
-
-    if (found := folder / PLACES).is_file():
+    found = folder / PLACES
+    if found.is_file() and foreign_places(site, folder) is None:
         import pyogrio
 
         pyogrio.write_dataframe(
             pyogrio.read_dataframe(found), package, layer="placement", driver="GPKG", append=True
         )
+
+
+def foreign_places(site: Site, folder: Path) -> str | None:
+    """Why the ranked places in a folder are left out: they were found for another site; None where they were not."""
+    found = folder / PLACES
+    if not found.is_file():
+        return None
+    import pyogrio
+    from pyproj import CRS
+
+    try:
+        table = pyogrio.read_dataframe(found)
+    except pyogrio.errors.DataSourceError as error:
+        return f"{found} is left out: it cannot be read ({error})"
+    of = sorted(set(table["site"])) if "site" in table else []
+    if of == [site.name] and table.crs == CRS(site.crs):
+        return None
+    whose = f"{', '.join(of)} ({table.crs.to_string()})" if of else "a site that it does not name"
+    return (
+        f"{found} is left out: its places were found for {whose}, not for {site.name} ({site.crs}). To have a layer of "
+        "places, run `lidarplan place` for this site, or export into its own folder with --out"
+    )
 
 
 def _write_instrument(plan: Plan, folder: Path, kind: Kind) -> None:

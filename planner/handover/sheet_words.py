@@ -141,7 +141,11 @@ def steps(
         which = f"Map {', '.join(best.names)} (lidarplan cnr-map plan) within the search window, in 1 m gates"
         weak = ", ".join(angle.removesuffix("_deg").replace("_", " ") for angle in best.undetermined)
         yield f"{which}. They leave {weak} undetermined." if weak else f"{which}; write what was found."
-        yield "Fit the maps (lidarplan cnr-map fit --write): offsets go into the site file. Export anew; check the level again."
+        solve = f" --solve {','.join(best.solvable)}" if weak and best.solvable else ""
+        yield (
+            f"Fit the maps (lidarplan cnr-map fit --write{solve}): offsets go into the site file. Export anew; check the "
+            "level again."
+        )
     names = ", ".join(f"“{layout.name}”" for layout in scans)
     yield f"Start {names or 'the scans'}; look at the first file: angles, gates, CNR at the measured gate."
     yield "Photograph the lidar from four sides, the levels, and the horizon along the beams."

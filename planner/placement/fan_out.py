@@ -160,21 +160,37 @@ def _work_on_shared(work: Work, batch: Batch) -> Any:
     return work(_shared, batch)
 
 
-def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> Iterator[tuple[Batch, Any]]:
-    """Results as they come from a dask cluster; a batch whose worker dies is worked on by another."""
+def require_scheduler(address: str) -> None:
+    """Meet a dask scheduler, whether or not the work will need it.
+
+    Raises
+    ------
+    UnavailableError
+        If dask is not installed, or it does not answer.
+    """
+    _client(address).close()
+
+
+def _client(address: str) -> Any:
     try:
-        from distributed import Client, as_completed
+        from distributed import Client
     except ImportError:
         raise UnavailableError(
             "--scheduler needs dask, which is not installed: pip install '.[cluster]'"
         ) from None
     try:
-        client = Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
+        return Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise UnavailableError(
             f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler` and give its tcp:// address"
         ) from error
-    with client:
+
+
+def _on_cluster(work: Work, shared: Any, batches: list[Batch], address: str) -> Iterator[tuple[Batch, Any]]:
+    """Results as they come from a dask cluster; a batch whose worker dies is worked on by another."""
+    with _client(address) as client:
+        from distributed import as_completed
+
         # not scattered: what is scattered to one worker dies with it
         sent = client.submit(_give, pickle.dumps(shared), pure=False, retries=RETRIES)
         futures = {

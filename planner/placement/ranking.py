@@ -9,7 +9,7 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import InputError
 from planner.placement import search
-from planner.placement.fan_out import How
+from planner.placement.fan_out import How, require_scheduler
 from planner.placement.infeasible import refusal
 from planner.placement.maps import (
     CRITERIA,
@@ -31,6 +31,7 @@ PHYSICAL = ("range-min", "range-max", "terrain")
 APART_CELLS = 4.0  # two places this many cells of the grid apart are different ones
 Tier = Literal["linear", "turbulent"]
 WHAT = {"vector": "wind vector", "speed": "wind speed", "direction": "wind direction"}
+UNIT = {"vector": "m/s", "speed": "m/s", "direction": "°"}
 MOST = 5  # distinct optima
 JUDGED = 12  # distinct optima of the linear tier that the turbulent tier judges
 STARTS = 12  # beginnings of sets of more than two
@@ -100,7 +101,11 @@ def place(
     InputError
         If no place keeps to every constraint: with the constraint that leaves none, and how much it must give; or if a
         target lies outside the terrain.
+    UnavailableError
+        If a scheduler is named and does not answer, even where the work is too little to need it.
     """
+    if how is not None and how.scheduler is not None:
+        require_scheduler(how.scheduler)
     seen = look(task, standing_m(task, grid.places_m))
     improve = Improve(task, fixed_tables(task), grid.spacing_m, cost or _free)
     error, sets = _searched(improve, seen, how, most if tier == "linear" else JUDGED)
@@ -220,7 +225,7 @@ def _ranked(improve: Improve, places_m: FloatArray, value: float, tier: Tier) ->
     if tier == "turbulent":
         turbulent = turbulent_numbers(task, looks)
         value = turbulent.value(task.criterion, task.aggregate) + float(improve.cost(places_m).sum())
-    text = _line(task, positions, numbers, turbulent, binds)
+    text = _line(task, positions, value, numbers, turbulent, binds)
     return Ranked(0, positions, value, numbers, turbulent, binds, text)
 
 
@@ -243,13 +248,14 @@ def _declared(improve: Improve, tier: Tier) -> Ranked | None:
     broken = [name for one in replaced for name, slack in one.slack.items() if not (slack >= 0.0).all()]
     soft = float(improve.cost(positions[:, :2]).sum())
     value = (turbulent or numbers).value(task.criterion, task.aggregate) + soft
-    text = _line(task, positions, numbers, turbulent, None)
+    text = _line(task, positions, value, numbers, turbulent, None)
     return Ranked(0, positions, value, numbers, turbulent, tuple(dict.fromkeys(broken)), text)
 
 
 def _line(
     task: Task,
     positions: FloatArray,
+    value: float,
     numbers: Numbers,
     turbulent: Turbulent | None,
     binds: tuple[str, ...] | None,
@@ -258,10 +264,11 @@ def _line(
     spots = " and ".join(f"E {east:.0f} N {north:.0f}" for east, north, _ in positions)
     worst = int(np.argmax(numbers.speed_std_mps))
     parts = [
-        f"{spots}: speed {numbers.speed_std_mps.max():.4f} m/s, direction {numbers.direction_std_deg.max():.3f}°"
+        f"{spots}: {WHAT[task.criterion]} {value:.4f} {UNIT[task.criterion]}",
+        f"speed {numbers.speed_std_mps.max():.4f} m/s, direction {numbers.direction_std_deg.max():.3f}°",
     ]
     if len(task.targets) > 1:
-        parts[0] += f" at the worst target ({task.targets[worst]} for speed)"
+        parts[1] += f" at the worst target ({task.targets[worst]} for speed)"
     if turbulent is not None:
         gusts = f"{turbulent.speed_std_mps.max():.3f} m/s and {turbulent.direction_std_deg.max():.2f}°"
         parts.append(f"with turbulence {gusts}")
@@ -300,6 +307,17 @@ def _changes(best: Ranked, declared: Ranked) -> list[str]:
         f"without it {said[0]}",
         said[1],
     ]
+
+
+def ranked_by(task: Task, tier: Tier, *, cost: bool) -> str:
+    """What the first number of every line is, and that it ranks."""
+    where = "" if len(task.targets) == 1 else " at the worst target"
+    if len(task.targets) > 1 and task.aggregate == "mean":
+        where = ", root mean square over the targets"
+    both = " (along and across it together)" if task.criterion == "vector" else ""
+    gusts = " with turbulence" if tier == "turbulent" else ""
+    added = " plus --near's cost" if cost else ""
+    return f"Ranked by the first number: the error of the {WHAT[task.criterion]}{both}{where}{gusts}{added}"
 
 
 def _why(task: Task, best: Ranked, declared: Ranked | None) -> str:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from planner.placement.maps import Look, of_lidar
 from planner.placement.numbers import numbers_of
-from planner.placement.task import Task, task_of
+from planner.placement.task import Task, refuse_twice, task_of
 from planner.scan_plans import SectorScan
 from planner.site import Site
 
@@ -43,10 +43,11 @@ def shared_by(
     Raises
     ------
     InputError
-        If a name is unknown, or the lidars cannot measure the wind together.
+        If a name is unknown or given twice, or the lidars cannot measure the wind together.
     """
     pair = [site.scan(name).lidar for name in site.pairs[0].scans] if site.pairs else []
     names = tuple(lidars) or tuple(pair) or tuple(lidar.name for lidar in site.lidars)
+    refuse_twice("lidar", names)
     chosen = tuple(site.lidar(name) for name in names)
     task = task_of(
         site, fixed=names[:-1], count=1, targets=tuple(targets) or tuple(t.name for t in site.targets)

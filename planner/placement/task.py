@@ -1,5 +1,6 @@
 """What is to be placed, for which targets, and what any place has to keep to."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -199,6 +200,19 @@ def default_limits(lidar: Lidar, scan: ScanPlan | None) -> Limits:
     )
 
 
+def refuse_twice(kind: str, names: Sequence[str]) -> None:
+    """Refuse a name that is given twice: it would count twice.
+
+    Raises
+    ------
+    InputError
+        Naming them.
+    """
+    twice = sorted({name for name in names if list(names).count(name) > 1})
+    if twice:
+        raise InputError(f"{kind} {', '.join(twice)} came more than once; give every {kind} once")
+
+
 def task_of(
     site: Site,
     *,
@@ -223,8 +237,9 @@ def task_of(
     Raises
     ------
     InputError
-        If the site has no lidar to take as a pattern, or a name is unknown.
+        If the site has no lidar to take as a pattern, or a name is unknown or given twice.
     """
+    refuse_twice("lidar", fixed or ())
     if not site.lidars:
         raise InputError("the site has no lidar: one is needed to say which instrument is placed")
     pair = site.pairs[0] if site.pairs else None
@@ -242,6 +257,7 @@ def task_of(
         pattern = site.lidar(free[-1] if free else site.lidars[-1].name)
         scan = next((item for item in site.scans if item.lidar == pattern.name), None)
     names = targets or ((pair.target,) if pair and not alone else tuple(item.name for item in site.targets))
+    refuse_twice("target", names)
     for name in names:
         site.target(name)
     height_m = pattern.position[2] - float(ground_under_m(site, pattern.position))

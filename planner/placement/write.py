@@ -159,6 +159,7 @@ def write_geopackage(found: Placement, folder: Path) -> str:
     rows = [
         {"rank": row["rank"], "lidar": place["lidar"], "height_m": place["height_m"], "value": row["value"]}
         | {
+            "site": found.task.site.name,
             "unit": row["unit"],
             "text": row["text"],
             "easting_m": place["easting_m"],

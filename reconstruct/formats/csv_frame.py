@@ -30,9 +30,11 @@ def delimited_frame(
     Raises
     ------
     InputError
-        If there is no header line, or it names a column twice.
+        If it is no text, there is no header line, or it names a column twice.
     """
     lines = lines_of(path)
+    if any(letter < " " and letter != "\t" for letter in lines[0]):
+        raise InputError(f"{path}: a binary file came; a table is text with a header line of columns")
     names = [cell.strip().strip('"') for cell in lines[0].split(separator)]
     if len(names) < 2:
         raise InputError(
@@ -80,7 +82,7 @@ def _numbers(column: "pd.Series[str]", where: str, name: str) -> tuple["pd.Serie
     wrong = (numbers.isna() & column.notna()).to_numpy()
     if not wrong.any():
         return numbers, []
-    if wrong.mean() > 0.5:
+    if wrong.sum() > 0.5 * column.notna().sum():  # empty cells are neither numbers nor text
         return column, []  # type: ignore[return-value]
     what = f"{str(column[wrong].iloc[0])[:20]!r} in {name} is no number"
     return numbers, [Loss(where, what, int(column.index[wrong][0]), int(wrong.sum()))]

@@ -45,7 +45,7 @@ def read_plain_csv(path: Path, options: Options | None = None) -> Records:
     Raises
     ------
     InputError
-        If a column is missing or no row is usable.
+        If a column or a time is missing, or no row is usable.
     """
     options = options or Options()
     if options.columns is None:
@@ -73,12 +73,27 @@ def _own(path: Path, options: Options) -> Records:
             "(options.columns), as its names are "
             "not those of a table of rays"
         )
-    frame = frame.assign(time_utc=to_times(frame["time_utc"]))
-    wide = not {"ray", "gate"} <= set(frame.columns)
-    records = from_wide(frame) if wide else from_long(frame)
+    if frame.empty:
+        raise InputError(f"{path}: no line of rays follows the header")
+    frame = frame.assign(time_utc=_times(frame, path))
+    records = from_long(frame) if {"range_m", "gate"} & set(frame.columns) else from_wide(frame)
     return replace(
         records, losses=tuple(losses), instrument=options.instrument or records.instrument
     ).mounted(options.mounting)
+
+
+def _times(frame: "pd.DataFrame", path: Path) -> "pd.Series[pd.Timestamp]":
+    """The times of a table in our names: every line needs one."""
+    times = to_times(frame["time_utc"])
+    absent = times.isna()
+    if absent.any():
+        line = int(frame.index[absent][0])
+        came = "nothing" if frame["time_utc"].isna()[line] else repr(frame["time_utc"][line])
+        raise InputError(
+            f"{path}:{line}: {came} came as the time (in all {int(absent.sum())} lines have none); allowed: ISO 8601 from "
+            "1970 to 2200. Leave lines without a time out"
+        )
+    return times
 
 
 def _renamed(

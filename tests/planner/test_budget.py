@@ -57,7 +57,7 @@ def test_a_reference_that_is_not_declared_is_named_and_one_that_is_counts():
     assert "speed_uncertainty_mps" in unknown.reason
     mast = site.masts[0].model_copy(update={"speed_uncertainty_mps": 0.1, "direction_uncertainty_deg": 1.0})
     declared = Plan(site.model_copy(update={"masts": (mast,)})).budgets[0]
-    assert entry(declared, "reference").speed_std_mps == pytest.approx(0.1)
+    assert entry(declared, "reference instrument").speed_std_mps == pytest.approx(0.1)
     assert np.isfinite(declared.entries[-1].speed_std_mps)
 
 

@@ -138,6 +138,12 @@ def at_longitude(longitude_deg: float, crs: str, latitude_deg: float = 57.0) -> 
     }
 
 
+def foot(height_m: float) -> Changes:
+    """A mast far from all beams, its foot at this height."""
+    away = {"name": "M", "position": [499000, 6249000, height_m], "height_m": 5, "width_m": 0.2}
+    return {"masts": [away]}
+
+
 def second_lidar(east_m: float) -> Changes:
     return {"lidars": [LIDAR_A, {**LIDAR_B, "position": [500000 + east_m, 6250000, 10]}], **scan()}
 
@@ -227,6 +233,8 @@ CASES = (
     Case("same-place", "warning", second_lidar(1.01), second_lidar(0.99)),
     Case("same-place", "warning", second_target(1.01), second_target(0.99)),
     Case("head-height", "warning", {"ground_height_m": 11.9}, {"ground_height_m": 12.1}),
+    Case("base-height", "info", foot(59.9), foot(60.1)),  # level ground at 10 m, 50 m either way
+    Case("base-height", "info", foot(-39.9), foot(-40.1)),
     Case("beam-blocked", "error", ground_stare(-1.1), ground_stare(-1.2)),  # 20 m over 1 km is 1.15°
     Case("target-height", "error", {"ground_height_m": 109.9}, {"ground_height_m": 110.0}),
     Case("head-unknown", "info", instrument(), instrument(head=None)),
@@ -290,7 +298,7 @@ def test_docs_list_the_same_codes_as_the_checks() -> None:
 
 
 def test_every_code_is_tested_from_both_sides() -> None:
-    with_a_raster = {"terrain-unknown"}  # in test_over_terrain
+    with_a_raster = {"terrain-unknown"}  # in test_over_terrain; of head-height and base-height one limit more
     assert {case.code for case in CASES} | with_a_raster == codes_in_the_code()
 
 

@@ -125,7 +125,7 @@ def test_rays_of_a_late_clock_are_moved_back_to_the_masts(
 ) -> None:
     """Forty seconds late: the means are those of the right clock again, and the log says by how much it was set."""
     path = campaign(
-        ('"sector-*.csv"', '"sector-*.csv", offsets: {clock_s: 40}'),
+        ('"sector-????.csv"', '"sector-????.csv", offsets: {clock_s: 40}'),
         ("mast:", "time_lag: {against: mast, longest_s: 120}\nsizes_deg: [60]\nmast:"),
     )
     found = retrieve(load_campaign(path))
@@ -208,7 +208,7 @@ def test_azimuths_that_lead_their_rays_are_turned_back(
     campaign: Callable[..., Path], tmp_path: Path, asked: str
 ) -> None:
     """Stamped 1.2 degrees ahead in the direction of each sweep: found within three of its standard deviations, and said."""
-    path = campaign(('"sector-*.csv"', f'"sector-*.csv", azimuth_lead_deg: {asked}'))
+    path = campaign(('"sector-????.csv"', f'"sector-????.csv", azimuth_lead_deg: {asked}'))
     for place in tmp_path.glob("sector-*.csv"):
         rays = pd.read_csv(place)
         ways = rays.groupby("sweep_id")["azimuth_deg"].transform(

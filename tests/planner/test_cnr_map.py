@@ -1,6 +1,7 @@
 """CNR maps from plan to site file: the window holds the target, and planted offsets come back."""
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -166,6 +167,60 @@ def test_targets_around_are_chosen_and_targets_in_one_direction_are_warned_of(pl
     warned = choose_targets(few, "L")
     assert warned is not None
     assert {"pitch_deg", "roll_deg"} <= set(warned.undetermined)
+
+
+def test_a_weak_set_of_targets_is_planned_and_fitted_with_the_angles_that_it_tells(
+    tmp_path: Path, capsys
+) -> None:
+    """Two targets: `plan` prints the --solve, `simulate` prints the fit, as it stands it works; without it, it is said."""
+    site, out = tmp_path / "site.yaml", tmp_path / "maps"
+    site.write_text(SITE, encoding="utf-8")
+    assert run(["cnr-map", "plan", str(site), "--lidar", "L", "--target", "tip N", "--quiet"]) == 0
+    assert "--solve" not in capsys.readouterr().out  # the four tips tell everything
+    few = [
+        *("cnr-map", "simulate", str(site), "--lidar", "L", "--out", str(out)),
+        "--target",
+        "tip N",
+        "--target",
+        "tip E",
+    ]
+    assert run([*few, "--plant", "azimuth_offset_deg=0.05"]) == 0
+    following = capsys.readouterr().err.split("Next: lidarplan ")[1].strip()
+    solve = following.split("--solve ")[1].split(",")
+    assert solve == ["azimuth_offset_deg", "elevation_offset_deg", "pitch_deg"]
+    assert run([*shlex.split(following), "--json"]) == 0
+    found = {item["name"]: item for item in json.loads(capsys.readouterr().out)["angles"]}
+    assert list(found) == solve
+    moved = found["azimuth_offset_deg"]["value_deg"] - found["azimuth_offset_deg"]["before_deg"]
+    assert abs(moved - 0.05) < 3.5 * found["azimuth_offset_deg"]["std_deg"]
+    assert run(shlex.split(following.split(" --solve")[0])) == 2
+    assert f"--solve {','.join(solve)}" in capsys.readouterr().err
+
+
+def test_a_plan_of_targets_in_one_direction_says_what_they_tell(tmp_path: Path, capsys) -> None:
+    """One tip alone: both offsets, with pitch and roll as declared."""
+    others = ("name: east", "name: south", "name: west", "name: tip E", "name: tip S", "name: tip W")
+    lines = [line for line in SITE.splitlines() if not any(other in line for other in others)]
+    site = tmp_path / "one.yaml"
+    site.write_text("\n".join(lines).replace("mast: south", "mast: north"), encoding="utf-8")
+    assert run(["cnr-map", "plan", str(site), "--lidar", "L"]) == 0
+    text = capsys.readouterr().out
+    assert (
+        "with pitch_deg, roll_deg as the site file has them: --solve azimuth_offset_deg,elevation_offset_deg."
+        in text
+    )
+
+
+def test_a_long_map_says_why_it_is_long(places: Places) -> None:
+    """A tip of 0.1 m, the heading known to 0.2°: more than half an hour, and that is said; one of 1 m: not."""
+    site = places.site
+    thin = [item.model_copy(update={"size_m": 0.1}) for item in site.hard_targets]
+    slow = plan_map(
+        Places(site.model_copy(update={"hard_targets": tuple(thin)})), "L", "tip N", heading_std_deg=0.2
+    )
+    assert slow.time_s > 1800.0
+    assert any(f"{slow.time_s / 60:.0f} min for " in note for note in slow.notes)
+    assert plan_map(places, "L", "tip N").notes == ()
 
 
 def test_of_many_targets_those_of_every_bearing_are_compared() -> None:

@@ -137,7 +137,7 @@ def test_a_site_without_scans_says_so(capsys: pytest.CaptureFixture[str], tmp_pa
     lidar = "{name: A, position: [500000, 6250000, 10], instrument: windscanner-200s}"
     site.write_text(f"name: Moor\ncrs: EPSG:32632\nlidars: [{lidar}]\n", encoding="utf-8")
     assert "no measured volume" in printed(capsys, "wakes", str(site))
-    assert "Nothing found" in printed(capsys, "check", str(site))
+    assert "Nothing found, but there are no scans to check" in printed(capsys, "check", str(site))
     assert document(capsys, "check", str(site)) == []
     assert run(["point", str(site)]) == 2
     assert "0 targets" in capsys.readouterr().err
@@ -209,3 +209,19 @@ def test_errors_drawn_by_chance_stand_with_their_standard_error(capsys: pytest.C
     assert shown_value(size, "unknown", "+.3f") == "–"
     print_table("", ("slope of the regression",), [("1.0012±0.0021",)])
     assert f"\n {'1.0012±0.0021':>23}\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("model", ["jensen", "iec"])
+def test_a_wake_model_that_is_not_asked_is_not_said_to_exclude_nothing(
+    model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whether the columns of Jensen and IEC hold a dash, by the model of the site."""
+    text = (ROOT / "examples" / "hovsore" / "site.yaml").read_text(encoding="utf-8")
+    site = tmp_path / "site.yaml"
+    site.write_text(text.replace("{model: union,", f"{{model: {model},"), encoding="utf-8")
+    rows = [line.split() for line in printed(capsys, "wakes", str(site)).splitlines() if "WS_K" in line]
+    assert rows
+    for row in rows:
+        after = row[row.index("cup") + 1 :]
+        jensen, iec = after[0] == "–", "–" in after[1:]
+        assert (jensen, iec) == (model == "iec", model == "jensen")

@@ -15,6 +15,8 @@ from planner.comparing import Comparison, Row, compare
 from planner.comparing_files import KINDS, write_comparison
 from planner.comparison_table import table_rows, verdicts
 from planner.error_nouns import SizeError
+from planner.figures.canvas import canvas
+from planner.figures.comparison import title
 from planner.files.yaml_campaign import load_campaign
 from planner.wind_profile import wind_profile
 
@@ -211,3 +213,16 @@ def test_the_command_prints_both_tables(folder: Path, capsys: pytest.CaptureFixt
     assert "Speed: means over 600 s against the mast" in said.out
     assert "plain slope" in said.out
     assert "as the reference study did" in said.err.replace("\n", " ")
+
+
+def test_a_long_line_under_a_title_goes_on_in_the_next_and_nothing_of_it_is_cut() -> None:
+    where = (
+        "A campaign with a long name, one of many: sector to the south, means over 10 min, 60°, 144 periods"
+    )
+    with canvas(5.4, 5.8) as figure:
+        title(figure, "Wind direction", where)
+        drawn = figure.texts[1]
+        box = drawn.get_window_extent(figure.canvas.get_renderer())  # type: ignore[attr-defined]
+        assert " ".join(drawn.get_text().split()) == where
+        assert "\n" in drawn.get_text()
+        assert box.x1 < figure.bbox.x1

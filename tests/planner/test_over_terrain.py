@@ -175,3 +175,117 @@ def test_the_scene_shows_the_hills_instead_of_a_plane(moor: Moor, tmp_path: Path
     top_m = max(float(item.vertices_m[:, 2].max()) for item in hills.items)
     assert top_m == pytest.approx(200.0 - 10.0, abs=1.0)  # above the origin, which lies at the lidar's level
     assert "ground" not in [layer.name for layer in scene.layers]
+
+
+BURIED_LIMIT_M = 4.0  # on a flat raster: the accuracy of a good one
+
+
+@pytest.mark.parametrize(("height_m", "buried"), [(8.0 - 3.9, False), (8.0 - 4.1, True), (-40.0, True)])
+def test_a_head_inside_the_terrain_sees_nothing(
+    moor: Moor, tmp_path: Path, height_m: float, buried: bool
+) -> None:
+    """Flat ground at 8 m: a little below it the head stands on it, farther below all its beams are lost."""
+    lidar = [{"name": "A", "position": [500000, 6250000, height_m], "instrument": "windscanner-200s"}]
+    plan = on(moor, terrain(tmp_path, flat()), lidars=lidar)
+    (row,) = plan.pointings
+    assert row.terrain == ("blocked" if buried else "clear")
+    assert row.terrain_distance_m is not None
+    assert (row.terrain_distance_m == 0.0) == buried
+    assert (row.terrain_clearance_m < 0.0) == buried
+    assert [sight.blocked.all() for sight in plan.over_terrain] == [buried]
+    (finding,) = [each for each in findings(plan) if each.code == "head-height"]
+    assert finding.severity == ("error" if buried else "warning")
+    assert finding.value == pytest.approx(height_m - 8.0)
+    assert finding.limit == (-BURIED_LIMIT_M if buried else -2.0)
+
+
+def test_on_a_slope_the_raster_is_given_half_of_what_it_changes_over_a_cell(
+    moor: Moor, tmp_path: Path
+) -> None:
+    """10 m up for each cell to the east: 4 m and 5 m."""
+    slope = flat() + 10.0 * np.arange(EAST_M.size)
+    ground_m = float(np.interp(500_000.0, EAST_M, slope[0]))
+    for below_m, codes in ((8.9, "warning"), (9.1, "error")):
+        place = [500000, 6250000, ground_m - below_m]
+        lidar = [{"name": "A", "position": place, "instrument": "windscanner-200s"}]
+        target = [{"name": "T", "position": [500000, 6251000, ground_m + 200]}]
+        plan = on(moor, terrain(tmp_path, slope), lidars=lidar, targets=target)
+        assert [each.severity for each in findings(plan) if each.code == "head-height"] == [codes]
+
+
+STANDING = {
+    "masts": {"name": "M", "height_m": 5, "width_m": 0.2},
+    "turbines": {"name": "W", "hub_height_m": 80, "rotor_diameter_m": 50, "thrust_coefficient": 0.8},
+    "obstacles": {"name": "O", "width_m": 5, "length_m": 5, "height_m": 5, "azimuth_deg": 0},
+    "hard_targets": {"name": "H", "shape": "tip", "size_m": 0.1, "uncertainty_m": 0.2},
+}
+
+
+@pytest.mark.parametrize("kind", list(STANDING))
+@pytest.mark.parametrize(("above_m", "found"), [(3.9, False), (4.1, True), (-3.9, False), (-4.1, True)])
+def test_a_foot_that_is_not_on_the_ground_is_found(
+    moor: Moor, tmp_path: Path, kind: str, above_m: float, found: bool
+) -> None:
+    """Flat ground at 8 m; a hard target may be above it on anything."""
+    thing = {**STANDING[kind], "position": [500300.0, 6249700.0, 8.0 + above_m]}
+    plan = on(moor, terrain(tmp_path, flat()), **{kind: [thing]})
+    seen = [each for each in findings(plan) if each.code == "base-height"]
+    assert len(seen) == (found and not (kind == "hard_targets" and above_m > 0))
+    for each in seen:
+        assert (each.severity, each.subject) == ("warning", thing["name"])
+        assert each.value == pytest.approx(above_m)
+        assert each.limit == np.sign(above_m) * BURIED_LIMIT_M
+
+
+def test_the_table_of_rays_and_point_tell_the_same_clearance(moor: Moor, tmp_path: Path) -> None:
+    """A ridge 12 m under the beam counts, the 2 m of the head above its own ground do not; before the ridge the flat."""
+    from planner.report_tables import terrain_table
+
+    gates = {"first_m": 100, "spacing_m": 100, "count": 10}
+    stare = {"name": "a", "lidar": "A", "target": "T", "type": "stare", "accumulation_s": 0.5, "gates": gates}
+    plan = on(moor, terrain(tmp_path, ridge(beam_height_m(500.0) - 12.0)), scans=[stare])
+    row = next(row for row in plan.pointings if row.lidar == "A")
+    assert row.terrain_clearance_m == pytest.approx(12.0, abs=0.05)
+    clear = {round(line[4]): line[6] for line in terrain_table(plan).rows}
+    assert clear[600] == clear[1000] == pytest.approx(row.terrain_clearance_m, abs=0.2)
+    assert clear[200] == pytest.approx(beam_height_m(199.0) - 8.0, abs=0.2)
+    assert min(clear.values()) > 5.0
+
+
+def test_a_zone_that_is_wrong_is_suspected_where_targets_lie_off_the_raster(
+    moor: Moor, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match="check `crs`: with the wrong UTM zone"):
+        findings(on(moor, terrain(tmp_path, flat()), crs="EPSG:32631"))
+
+
+@pytest.mark.parametrize(("given", "told"), [("", "nothing came"), (", height_datum: ellipsoidal", "")])
+def test_a_datum_that_is_needed_is_asked_for_by_its_line(
+    given: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every command that reads the site says the same, whether or not it looks at the ground."""
+    terrain(tmp_path, flat())
+    site = f"""name: moor
+crs: EPSG:32632
+height_datum: ellipsoidal
+terrain: {{file: ground.tif{given}}}
+lidars: [{{name: A, position: [500000, 6250000, 10], instrument: windscanner-200s}}]
+targets: [{{name: T, position: [500000, 6250900, 60]}}]
+"""
+    (tmp_path / "site.yaml").write_text(site, encoding="utf-8")
+    for command in ("check", "wakes", "crossings"):
+        assert run([command, str(tmp_path / "site.yaml")]) == (2 if told else 0)
+        errors = capsys.readouterr().err
+        assert ("site.yaml:4: terrain.height_datum: nothing came" in errors) == bool(told)
+
+
+def test_a_datum_that_the_file_contradicts_is_told_by_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """EPSG:5773 counts from the geoid EGM96."""
+    write_geotiff(tmp_path / "ground.tif", {"height": flat()}, EAST_M, NORTH_M, "EPSG:32632+5773")
+    site = "name: moor\ncrs: EPSG:32632\nterrain:\n  file: ground.tif\n  height_datum: ellipsoidal\n"
+    (tmp_path / "site.yaml").write_text(site, encoding="utf-8")
+    assert run(["check", str(tmp_path / "site.yaml")]) == 2
+    assert "site.yaml:5: terrain.height_datum: 'ellipsoidal' came" in (told := capsys.readouterr().err)
+    assert "above sea level: leave height_datum out" in told

@@ -176,3 +176,13 @@ def test_the_command_places_on_a_terrain_and_writes_everything(tmp_path, capsys)
     assert (above[:4] >= 0).all() and (above[-2:] < 0).all()  # north of the ridge the target is seen
     assert run(["export", str(tmp_path / "site.yaml"), "--as", "gpkg", "--out", str(out), "--quiet"]) == 0
     assert "placement" in pyogrio.list_layers(out / "plan.gpkg")[:, 0]
+    capsys.readouterr()
+    for change in (("name: a", "name: no"), ("EPSG:32632", "EPSG:25832")):  # another site, the same folder
+        (tmp_path / "other.yaml").write_text(SITE.replace(*change), encoding="utf-8")
+        assert run(["export", str(tmp_path / "other.yaml"), "--as", "gpkg", "--out", str(out), "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)["left_out"]
+        assert "placement" not in pyogrio.list_layers(out / "plan.gpkg")[:, 0]
+        assert len(told) == 1 and "its places were found for" in told[0]
+    (out / "places.gpkg").write_bytes(b"torn")
+    assert run(["export", str(tmp_path / "site.yaml"), "--as", "gpkg", "--out", str(out)]) == 0
+    assert "places.gpkg is left out: it cannot be read" in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """What a stay yields and what shared lidars give: against the published week, and against sums done by hand."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,3 +111,20 @@ def test_one_lidar_shares_by_its_sector_scan():
     names, (only,) = shared_by(load_site(HOVSORE), lidars=["WS_S"])
     assert names == ("WS_S",)
     assert only.speed_std_mps == only.alone_speed_std_mps
+
+
+def test_no_row_goes_on_beyond_the_wanted_speeds(tmp_path, capsys):
+    """Speeds that end at 20 m/s have no bin that does not: it would never fill."""
+    text = (
+        Path(HOVSORE)
+        .read_text(encoding="utf-8")
+        .replace("speed_range_mps: [4, 25]", "speed_range_mps: [4, 20]")
+    )
+    (tmp_path / "site.yaml").write_text(text, encoding="utf-8")
+    assert run(["stay", str(tmp_path / "site.yaml"), "--days", "3000"]) == 0
+    shown = capsys.readouterr().out
+    assert "19–20" in shown
+    assert (
+        not any(f"{first}–2{last}" in shown for first in (20, 21) for last in (1, 2, 5))
+        and "> 3650" not in shown
+    )

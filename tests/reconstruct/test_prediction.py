@@ -265,7 +265,7 @@ def test_budget_adds_up() -> None:
     known = [e for e in table[:-1] if e.speed_share is not None]
     assert sum(e.speed_share for e in known) == pytest.approx(1)  # type: ignore[misc]
     assert sum(e.direction_share for e in known) == pytest.approx(1)  # type: ignore[misc]
-    assert by_name["reference"].direction_std_deg == pytest.approx(1.0)
+    assert by_name["reference instrument"].direction_std_deg == pytest.approx(1.0)
     assert by_name["clock"].speed_std_mps is None
     assert by_name["total"].expanded()[0] == pytest.approx(2 * by_name["total"].speed_std_mps)  # type: ignore[operator]
 
