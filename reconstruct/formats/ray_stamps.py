@@ -72,7 +72,9 @@ def to_middle(records: Records, stamp: Stamp) -> Records:
         f"{float(np.median(np.abs(share * lift))):.3f} deg (median)"
     )
     if guessed := int(np.count_nonzero(~np.isfinite(records.duration_s))):
-        note += f"; the file states no duration of {guessed} rays: taken as their usual spacing of {usual:g} s"
+        note += (
+            f"; the file states no duration of {guessed} rays: taken as their usual spacing of {usual:g} s"
+        )
     time = records.time_utc + seconds_delta(half * duration)
     order = np.argsort(time, kind="stable")
     return replace(
