@@ -122,8 +122,11 @@ class Turbulence(Noun):
     """Turbulence intensity: standard deviation over mean of the longitudinal wind speed in ten minutes. E.g. 0.09"""
     length_m: Positive
     """Longitudinal integral length scale; the Kaimal length of IEC 61400-1 is 2.33 times as long. E.g. 170"""
-    model: Literal["von-karman"] = "von-karman"
-    """Spectral model of the turbulence. E.g. von-karman"""
+    model: Literal["von-karman", "kaimal", "mann"] = "von-karman"
+    """Spectral model of the turbulence: isotropic von Kármán, IEC Kaimal with coherence, or Mann's uniform shear. E.g.
+    von-karman"""
+    gamma: Annotated[float, Field(strict=True, ge=0, le=5)] = 3.9
+    """Shear distortion Γ of the Mann model; 0 is isotropic, and the other models have none. E.g. 3.9"""
 
 
 class Wind(Noun):

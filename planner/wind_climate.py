@@ -145,7 +145,7 @@ def turbulence(site: Site) -> Turbulence | None:
     declared = site.assumed_wind.turbulence
     if declared is None:
         return None
-    return Turbulence(declared.intensity, declared.length_m, declared.model)
+    return Turbulence(declared.intensity, declared.length_m, declared.model, declared.gamma)
 
 
 def error_sources(lidar: Lidar, noise_mps: float) -> ErrorSources:

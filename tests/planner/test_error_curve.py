@@ -118,3 +118,18 @@ def test_default_sizes_are_whole_steps_from_the_declared_one_down(hovsore):
     assert sizes == (60, 50, 44, 38, 30, 22, 14, 8, 4)
     with pytest.raises(InputError, match="stare"):
         default_sizes(hovsore.layout["stare K"])
+
+
+def test_manns_tensor_without_shear_is_von_karmans(hovsore):
+    """The site file's `gamma: 0`: two ways to one spectrum, within 1 %; with shear the scatter along the wind differs."""
+
+    def scatter(**air: object) -> float:
+        wind = hovsore.site.wind
+        turbulence = wind.turbulence.model_copy(update=air)
+        site = hovsore.site.model_copy(update={"wind": wind.model_copy(update={"turbulence": turbulence})})
+        (sector, _) = Plan(site).errors(sizes_deg=(30,), sizes_from="subset")
+        return float(sector.sizes[0].values["speed_std_mps"])
+
+    isotropic = scatter()
+    assert scatter(model="mann", gamma=0.0) == pytest.approx(isotropic, rel=0.01)
+    assert scatter(model="mann", gamma=3.9) < 0.9 * isotropic
